@@ -60,7 +60,8 @@ def init(
             "In the gateway's configuration:",
             f"  grpc: {{host: 0.0.0.0}}\n  security: {{credentials: {files.path}}}",
         )
-    _say(f"Then, for each person:  {credentials_command('add NAME --role viewer|operator|admin')}")
+    add_one = credentials_command("add NAME --role viewer|operator|admin", directory, config)
+    _say(f"Then, for each person:  {add_one}")
 
 
 @app.command()

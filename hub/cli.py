@@ -136,7 +136,7 @@ def robots(
     table = Table("NAME", "KIND", "REVOKED", "KEY", box=None)
     for each in users:
         revoked = (
-            datetime.fromtimestamp(each.revoked, UTC).strftime("%Y-%m-%d %H:%M") if each.revoked else "-"
+            datetime.fromtimestamp(each.revoked, UTC).strftime("%Y-%m-%d %H:%M UTC") if each.revoked else "-"
         )
         table.add_row(each.name, each.kind, revoked, each.keys[-1][:12])
     Console(highlight=False, markup=False, emoji=False).print(table)

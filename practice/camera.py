@@ -44,6 +44,8 @@ class CameraStream:
     ) -> None:
         self.delivery = Delivery(kind=DeliveryChoice.DIRECT)
         """As over a network that loses nothing."""
+        self.received_s: float | None = None
+        """Unknown: each frame is shown as soon as it comes."""
         self._queue = queue
         self._look, self._captured, self._network, self._paint = look, captured, network, paint
         self._on_their_way: deque[tuple[float, Frame]] = deque(maxlen=_MOST_ON_THEIR_WAY)
@@ -51,10 +53,11 @@ class CameraStream:
         self._thread = threading.Thread(target=self._run, name="practice-camera", daemon=True)
         self._thread.start()
 
-    def close(self) -> None:
-        """Ends the stream; afterwards nothing reaches the queue."""
+    def close(self) -> bool:
+        """Ends the stream; afterwards nothing reaches the queue. Returns whether it ended in time."""
         self._closed.set()
         self._thread.join(_ENDS_WITHIN_S)
+        return not self._thread.is_alive()
 
     def _run(self) -> None:
         while not self._closed.wait(_PERIOD_S):

@@ -1,7 +1,7 @@
 """robotctl events: past events of the robot and, with --follow, new ones."""
 
 from collections.abc import Iterator
-from typing import Annotated, Final
+from typing import Annotated
 
 import typer
 from rich.text import Text
@@ -14,11 +14,10 @@ from console.cli.stopping import until_stopped
 from console.cli.tables import STYLES
 from console.client import CaughtUp, Event, EventGap, EventPosition, FaultSeverity, Outage
 from console.client.results import GapReason
-from console.presentation.formatting import plural, wall_clock
+from console.presentation.formatting import plural, wall_clock, without_component
 from console.presentation.json_form import json_form
 from console.presentation.severity_style import FAULT_STYLES
 
-_CLOCK_FORM: Final = "%Y-%m-%d %H:%M:%S %Z"
 """With the time zone, which the robot's log may not share."""
 
 
@@ -67,12 +66,12 @@ def _show(session: Session, item: Event | EventGap | Outage) -> None:
 def _columns(item: Event | EventGap | Outage) -> Iterator[Text]:
     match item:
         case Event():
-            yield Text(f"{wall_clock(item.wall_clock_unix_ms, form=_CLOCK_FORM):24}", style="dim")
+            yield Text(f"{wall_clock(item.wall_clock_unix_ms):24}", style="dim")
             loud = item.severity in (FaultSeverity.WARNING, FaultSeverity.ERROR)
             style = STYLES[FAULT_STYLES[item.severity]] if loud else ""
             yield Text(f"{item.severity.value:7}", style=style)
             yield Text(f"{item.component:10}")
-            yield Text(item.message)
+            yield Text(without_component(item.component, item.message))
         case EventGap():
             yield Text(f"--- {_missing(item)}", style="bold yellow")
         case Outage():

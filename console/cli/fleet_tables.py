@@ -22,7 +22,7 @@ from console.fleet.values import (
     StoredRecording,
     Unreadable,
 )
-from console.presentation.formatting import age, plural, size, wall_clock
+from console.presentation.formatting import age, plural, size, wall_clock, without_component
 from console.presentation.severity_style import FAULT_STYLES, SeverityStyle
 
 _LONGEST_MESSAGE = 500
@@ -90,11 +90,11 @@ def item_line(item: FleetItem) -> Text:
             style = STYLES[FAULT_STYLES[event.severity]] if loud else ""
             return Text("  ").join(
                 (
-                    Text(f"{wall_clock(event.wall_clock_unix_ms):19}", style="dim"),
+                    Text(f"{wall_clock(event.wall_clock_unix_ms):24}", style="dim"),
                     Text(f"{shortened(item.robot):12}", style="bold"),
                     Text(f"{event.severity.value:7}", style=style),
                     Text(f"{shortened(event.component):10}"),
-                    Text(shortened(event.message, _LONGEST_MESSAGE)),
+                    Text(shortened(without_component(event.component, event.message), _LONGEST_MESSAGE)),
                 )
             )
         case EventsDropped():

@@ -53,7 +53,7 @@ def login(
     check_name(name)
     target = parse_target(target)
     if not (replacing or ca):
-        _check_free(name)
+        _check_free(name, file)
     user, credentials = _with_new_authority(name, ca) if ca else _read(file)
     gateway_name = ""
     if not offline:
@@ -92,14 +92,25 @@ def once_known(ask: Callable[[], AnswerT], sleep: Callable[[float], None] = time
         sleep(pauses.next_s())
 
 
-def _check_free(name: str) -> None:
+def _check_free(name: str, file: str) -> None:
     known = read_robots_file().robots.get(name)
-    if known and any(getattr(known, key) for key in FILE_KEYS):
+    if not known or not any(getattr(known, key) for key in FILE_KEYS):
+        return
+    what = f"'{name}' has a login already, at {known.target}"
+    if file == STANDARD_INPUT and not sys.stdin.isatty():
+        # It was issued by what is at the other end of the pipe, and nothing else has it.
+        issued = parse_login(login_text(file)).revoked_by
         raise UserError(
-            f"'{name}' has a login already, at {known.target}",
-            f"Type: {shlex.join(['robotctl', *sys.argv[1:], '--replace'])}",
+            f"{what}; the one in the pipe is not stored, but stays valid",
+            f"Type on the robot: robot-gateway credentials revoke {issued}; "
+            "then repeat the whole pipe, with --replace at its end",
             exit_code=ExitCode.USAGE,
         )
+    raise UserError(
+        what,
+        f"Type: {shlex.join(['robotctl', *sys.argv[1:], '--replace'])}",
+        exit_code=ExitCode.USAGE,
+    )
 
 
 def login_text(file: str) -> str:

@@ -352,7 +352,8 @@ def _view(recording: Recording) -> RenderableType:
         files.add_row(Text(file.name), size(file.size), Text("" if file.final else "still written"))
     gaps = grid("nowrap", "nowrap", "fold")
     for gap in recording.gaps:
-        when = f"{wall_clock(gap.began_unix_ms)} to {wall_clock(gap.ended_unix_ms, form='%H:%M:%S')}"
+        began = wall_clock(gap.began_unix_ms, form="%Y-%m-%d %H:%M:%S")
+        when = f"{began} to {wall_clock(gap.ended_unix_ms, form='%H:%M:%S %Z')}"
         gaps.add_row(
             Text("gap", style="bold yellow"), Text(when), f"{gap.cause.value}, {_lost(gap.messages)}"
         )

@@ -145,7 +145,7 @@ def _next_step(found: "DiscoveredRobot", names: Mapping[str, str]) -> str:
     if name := names.get(found.target):
         return f"known as {name}"
     if found.tls:
-        return f"robotctl login {found.nickname} {found.target} FILE"
+        return found.login_command
     return f"robotctl robots add {found.nickname} {found.target}"
 
 

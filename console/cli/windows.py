@@ -18,7 +18,8 @@ from console.presentation.json_form import json_form
 from console.receiver.delivery import DeliveryChoice
 from console.receiver.recording import Recording
 from console.robots.robots_file import Robot
-from console.robots.roster import RobotChoice
+from console.robots.roster import RobotChoice, Roster
+from console.robots.search import NetworkSearch
 from console.target import parse_target
 from console.viewer.headless import watch_headless
 from console.viewer.summary import ViewSummary
@@ -126,7 +127,7 @@ def open_monitor(session_of_robot: Callable[[], Session]) -> None:
         name = choice.name if choice.known else None
         return replace(session, robot=Robot(target=choice.target), name=name).credentials
 
-    run_monitor(session.target, session.credentials, login_of=login_of)
+    run_monitor(session.target, session.credentials, Roster(search=NetworkSearch()), login_of)
 
 
 def _view_headless(

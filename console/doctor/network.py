@@ -1,14 +1,13 @@
 """The network path to the robot, below gRPC: its name, its TCP port, the UDP port of its stream."""
 
-import queue
 import socket
-import threading
 import time
 from collections.abc import Iterable
-from typing import Any, Final
+from typing import Final
 
 from common.findings import Finding, good, note, wrong
 from console.doctor.srt_probe import answers_as_srt
+from console.name_lookup import resolve
 
 _WITHIN_S: Final = 2.0
 
@@ -21,24 +20,12 @@ def split(target: str) -> tuple[str, int]:
 
 def name_finding(host: str) -> Finding:
     """Checks whether the robot's name resolves."""
-    outcome: queue.SimpleQueue[list[Any] | OSError | UnicodeError] = queue.SimpleQueue()
-
-    def resolve() -> None:
-        try:
-            outcome.put(socket.getaddrinfo(host, None, type=socket.SOCK_STREAM))
-        except (OSError, UnicodeError) as error:
-            outcome.put(error)
-
-    # The resolver takes no timeout. A daemon: the program ends without it.
-    threading.Thread(target=resolve, name="resolver", daemon=True).start()
     try:
-        found = outcome.get(timeout=_WITHIN_S)
-    except queue.Empty:
-        found = TimeoutError(f"no answer within {_WITHIN_S:g} s")
-    if isinstance(found, Exception):
+        found = resolve(host, None, socket.SOCK_STREAM, _WITHIN_S)
+    except OSError as error:
         return wrong(
             "name",
-            f"'{host}' does not resolve: {found}",
+            f"'{host}' does not resolve: {error}",
             "Without an address the robot can't be reached",
             f"Use the robot's address instead (--target ADDRESS), or look the name up: getent hosts {host}",
         )

@@ -9,6 +9,7 @@ from console.client.results import FaultSeverity, Freshness, Sample
 from console.monitor.link import LinkState, LinkText
 from console.monitor.monitor_state import MonitorState
 from console.presentation.formatting import UNKNOWN, joined, plural, quantity
+from console.presentation.own_stream import OwnStream
 from console.presentation.picture_age import PictureAge
 from console.presentation.severity_style import HEALTH_STYLES, SeverityStyle
 from console.presentation.status_table import health_summary
@@ -65,7 +66,11 @@ def health_item(state: MonitorState, now_s: float) -> BarItem:
         *(plural(number, severity.value) for severity in _COUNTED if (number := severities.count(severity)))
     )
     detail = joined(counts, health.summary)
-    return BarItem(health.state.value.upper(), detail, HEALTH_STYLES[health.state], summary)
+    style = HEALTH_STYLES[health.state]
+    if counts and style is SeverityStyle.GOOD:
+        # The health may ignore a fault; a tick beside "1 error" would deny it.
+        style = SeverityStyle.WARNING
+    return BarItem(health.state.value.upper(), detail, style, summary)
 
 
 def battery_item(state: MonitorState, now_s: float) -> BatteryItem:
@@ -86,13 +91,19 @@ def battery_item(state: MonitorState, now_s: float) -> BatteryItem:
     return BatteryItem(word, detail, found.style, charge_percent=charge)
 
 
-def link_item(state: MonitorState, link: LinkText, now_s: float) -> BarItem:
-    """Returns the connection's state; while connected with round trip, loss of the video, and Wi-Fi."""
+def link_item(state: MonitorState, link: LinkText, now_s: float, stream: OwnStream | None = None) -> BarItem:
+    """Returns the connection's state; while connected with round trip, loss of the video, and Wi-Fi.
+
+    The loss is that of this window's stream where it is known, else the largest one of all viewers.
+    """
     if state.link.state is not LinkState.CONNECTED or state.snapshot is None:
         return BarItem(link.mark, link.detail, link.style)
     status = state.snapshot.status
     measured, network = status.preview.measured, status.platform.network
     loss = None if _is_stale(measured, state, now_s) else measured.worst_loss_percent
+    whose = "of all viewers' video, the largest"
+    if stream and stream.loss_percent is not None:
+        loss, whose = stream.loss_percent, "of the video here"
     signal = None if _is_stale(network, state, now_s) else network.wifi_signal_dbm
     found = worst(
         (ROUND_TRIP_MS.judge(state.link.answer_ms), LOSS_PERCENT.judge(loss), WIFI_DBM.judge(signal))
@@ -103,30 +114,34 @@ def link_item(state: MonitorState, link: LinkText, now_s: float) -> BarItem:
         "" if loss is None else f"loss {quantity(loss, '%')}",
         "" if signal is None else f"Wi-Fi {signal} dBm",
     )
-    tip = f"{link.mark}: round trip to the gateway, packet loss of the video, signal of the robot's Wi-Fi"
+    tip = f"{link.mark}: round trip to the gateway, packet loss {whose}, signal of the robot's Wi-Fi"
     return BarItem(link.mark, " \u00b7 ".join(filter(None, parts)), found.style, tip)
 
 
-def picture_item(age: PictureAge | None, frozen_s: float | None) -> BarItem:
+def picture_item(age: PictureAge | None, frozen_s: float | None, stream: OwnStream | None = None) -> BarItem:
     """Returns the age of the picture on the screen.
 
     Args:
         age: the reading; None without one.
         frozen_s: how long the picture has been frozen; None while it is live, or without a picture.
+        stream: how the pictures of this window come; None before they do.
     """
+    delivery = stream.text if stream else ""
     if frozen_s is not None:
-        return BarItem(f"> {quantity(frozen_s, 's')}", "picture frozen", SeverityStyle.BAD)
+        return BarItem(f"> {quantity(frozen_s, 's')}", "picture frozen", SeverityStyle.BAD, delivery)
     if age is None:
-        return BarItem(UNKNOWN, "picture age")
+        return BarItem(UNKNOWN, "picture age", tip=joined("the age is not known", delivery))
     found = PICTURE_AGE_MS.judge(age.age_ms)
     error = "" if age.error_ms is None else f" \u00b1 {age.error_ms:.0f}"
     detail = joined(found.word, "picture age")
-    return BarItem(f"{age.age_ms:.0f}{error} ms", detail, found.style, age.cause)
+    return BarItem(f"{age.age_ms:.0f}{error} ms", detail, found.style, joined(age.cause, delivery))
 
 
-def mode_item(state: MonitorState) -> BarItem:
+def mode_item(state: MonitorState, now_s: float) -> BarItem:
     """Returns the robot's mode; a mode that is published on change only stays valid when stale."""
     mode = state.snapshot.status.mission.mode if state.snapshot else None
+    if mode and state.outdated(now_s):
+        return BarItem(mode, "last known", tip="The robot does not answer: this was its mode")
     return BarItem(mode or UNKNOWN, "mode")
 
 

@@ -32,6 +32,7 @@ class Metric:
 
 
 METRICS: Final = (
+    Metric("Picture age", "ms", 0, 200),
     Metric("Video rate", "fps", 0, 40),
     Metric("Video bit rate", "kbit/s", 0, 1000),
     Metric("Video round trip", "ms", 0, 20, digits=1),
@@ -43,12 +44,20 @@ Values: TypeAlias = tuple[float | None, ...]
 NOTHING: Final[Values] = (None,) * len(METRICS)
 
 
-def values_of(status: SystemStatus) -> Values:
-    """Returns the metrics of one status; stale ones are None."""
+def values_of(picture_age_ms: float | None, status: SystemStatus | None) -> Values:
+    """Returns the metrics of one moment; stale ones are None.
+
+    Args:
+        picture_age_ms: the largest age of the picture since the moment before.
+        status: the robot's; None while it is not known.
+    """
+    if status is None:
+        return (picture_age_ms, *NOTHING[1:])
     measured, compute = status.preview.measured, status.platform.compute
     video = (measured.fps, measured.bitrate_kbps, measured.worst_rtt_ms)
     computer = (compute.cpu_percent, compute.cpu_temperature_c)
     return (
+        picture_age_ms,
         *(video if measured.freshness is Freshness.FRESH else (None,) * 3),
         *(computer if compute.freshness is Freshness.FRESH else (None,) * 2),
     )

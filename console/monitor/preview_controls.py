@@ -1,7 +1,7 @@
 """Model of the preview's controls: their texts, their requests, and when they are enabled."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from console.client import Camera, CameraState, GatewayError, PreviewProfile, PreviewState, PreviewStatus
 from console.monitor.link import LinkState
@@ -22,6 +22,7 @@ class Controls(PreviewSwitch):
         summary: size, rate and encoder.
         answers: the outcome of the operator's request.
         conditions: the robot's own messages.
+        beside_faults: of these, the ones that no active fault says.
         cameras: of the robot, in its order; the wanted one is `wanted_camera`.
         wanted_camera: the one chosen last, or selected for the next start.
     """
@@ -32,6 +33,7 @@ class Controls(PreviewSwitch):
     summary: str
     answers: tuple[Note, ...]
     conditions: tuple[Note, ...]
+    beside_faults: tuple[Note, ...] = ()
     cameras: tuple[Camera, ...] = ()
     wanted_camera: str = ""
 
@@ -56,6 +58,11 @@ def controls(
     current = PreviewState.UNKNOWN if preview is None or state.outdated(now_s) else preview.state
     on = preview is not None and is_on(preview)
     pending = state.request is not None and state.request.pending
+    said = {fault.id for fault in state.snapshot.status.faults if fault.active} if state.snapshot else set()
+    conditions = dict(_robot_notes(preview)) if preview else {}
+    if state.outdated(now_s):
+        # They may be over by now.
+        conditions = {key: replace(note, style=SeverityStyle.QUIET) for key, note in conditions.items()}
     return Controls(
         enabled=preview is not None and state.link.state is LinkState.CONNECTED and not pending,
         on=on,
@@ -64,7 +71,8 @@ def controls(
         style=PREVIEW_STYLES[current],
         summary=_summary(preview) if preview and current is not PreviewState.UNKNOWN else "",
         answers=tuple(_request_notes(state.request, now_s)),
-        conditions=tuple(_robot_notes(preview)) if preview else (),
+        conditions=tuple(conditions.values()),
+        beside_faults=tuple(note for fault, note in conditions.items() if fault not in said),
         camera="" if on else selected_camera,
         cameras=preview.cameras if preview else (),
         wanted_camera=_wanted_camera(preview, "" if on else selected_camera),
@@ -108,22 +116,25 @@ def _request_notes(request: PreviewRequest | None, now_s: float) -> Iterator[Not
         yield Note(outcome.message, SeverityStyle.QUIET)
 
 
-def _robot_notes(preview: PreviewStatus) -> Iterator[Note]:
+def _robot_notes(preview: PreviewStatus) -> Iterator[tuple[str, Note]]:
+    """Yields the robot's own messages, each with the ID of the fault that says the same."""
     if preview.last_error:
-        yield Note(
-            preview.last_error,
-            SeverityStyle.BAD if preview.state is PreviewState.FAULTED else SeverityStyle.WARNING,
+        faulted = preview.state is PreviewState.FAULTED
+        yield (
+            "preview.faulted",
+            Note(preview.last_error, SeverityStyle.BAD if faulted else SeverityStyle.WARNING),
         )
     elif not preview.service_reachable:
-        yield Note("The preview service on the robot does not answer the gateway", SeverityStyle.WARNING)
+        unreachable = "The preview service on the robot does not answer the gateway"
+        yield "preview.unreachable", Note(unreachable, SeverityStyle.WARNING)
     wanted = preview.camera(preview.wanted_camera)
     if wanted and wanted.state is CameraState.FAILED and preview.state is PreviewState.RUNNING:
         live = preview.live_camera
         instead = f"; {live.name} is shown" if live else ""
-        yield Note(f"Camera {wanted.name} does not work{instead}: {wanted.error}", SeverityStyle.WARNING)
+        text = f"Camera {wanted.name} does not work{instead}: {wanted.error}"
+        yield f"preview.camera.{wanted.name}", Note(text, SeverityStyle.WARNING)
     if preview.encoder and preview.encoder.fallback_reason:
-        yield Note(
-            f"Preferred {preview.encoder.wanted}: {preview.encoder.fallback_reason}", SeverityStyle.WARNING
-        )
+        text = f"Preferred {preview.encoder.wanted}: {preview.encoder.fallback_reason}"
+        yield "preview.fallback", Note(text, SeverityStyle.WARNING)
     if preview.bitrate_reason:
-        yield Note(f"Bit rate: {preview.bitrate_reason}", SeverityStyle.WARNING)
+        yield "", Note(f"Bit rate: {preview.bitrate_reason}", SeverityStyle.WARNING)

@@ -49,7 +49,7 @@ _CUT_SHORT: Final = {
     RecordingStopReason.DISK: "because the disk has no more room",
     RecordingStopReason.ERROR: "by an error of the disk",
 }
-_BEGAN: Final = "%d %b %H:%M"
+_BEGAN: Final = "%d %b %H:%M %Z"
 _COMPONENT: Final = "recording"
 _DISK: Final = "recording.disk"
 """Component and ID of faults (docs/recording.md)."""

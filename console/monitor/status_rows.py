@@ -6,7 +6,8 @@ from typing import Final
 from console.client.results import Fault
 from console.monitor.alarm import Alarm, Occurrence, occurrence
 from console.monitor.monitor_state import MonitorState
-from console.presentation.formatting import age
+from console.presentation.formatting import age, with_component
+from console.presentation.own_stream import OwnStream
 from console.presentation.severity_style import FAULT_STYLES, SeverityStyle
 from console.presentation.status_table import Row, View, table_rows
 
@@ -67,10 +68,16 @@ def component_rows(state: MonitorState, now_s: float) -> list[Row]:
     return table_rows(view)
 
 
+def stream_rows(stream: OwnStream | None) -> list[Row]:
+    """Returns the row of the stream as this computer receives it; none before it does."""
+    if stream is None:
+        return []
+    mark, style = ("LATE", SeverityStyle.WARNING) if stream.is_fallback else ("direct", SeverityStyle.GOOD)
+    return [Row("Stream here", mark, style, stream.text)]
+
+
 def _fault_row(fault: Fault, snapshot_age_ms: int) -> Row:
-    # Many messages begin with the name of the component.
-    named = fault.message.casefold().startswith(fault.component.casefold())
-    text = fault.message if named else f"{fault.component}: {fault.message}"
+    text = with_component(fault.component, fault.message)
     if fault.active:
         since = f"for {age(fault.age_ms + snapshot_age_ms)}"
         return Row("", fault.severity.value, FAULT_STYLES[fault.severity], text, since, fault.remedy)

@@ -1,14 +1,21 @@
 """What a viewer sends to the robot besides watching: requests for key frames, and the age of its picture."""
 
 import asyncio
-from collections.abc import Callable, Coroutine
-from typing import Any, Final, Protocol
+import time
+from collections.abc import Callable
+from typing import Final, Protocol
 
+from common.token_bucket import TokenBucket
 from console.client import GatewayError, PictureReport, Unsupported, results
 
 _REPORT_S: Final = 1.0
-_LEAST_BETWEEN_REQUESTS_S: Final = 0.34
-"""The robot takes three requests a second of one connection. Further losses meanwhile share the next one."""
+_BURST: Final = 3
+_REQUEST_EVERY_S: Final = 0.34
+"""The robot takes three requests at once of one connection, and three a second in the long run. Further
+losses meanwhile share the next one."""
+_ANSWERED_WITHIN_S: Final = 1.0
+_FAILED_FOR_S: Final = 5.0
+"""After a request that failed, for whatever reason, a new connection to the stream is the quicker way."""
 
 
 class FeedbackClient(Protocol):
@@ -25,8 +32,8 @@ class ViewerFeedback:
     """Sends requests and reports while it runs. Belongs to the loop that runs it.
 
     Both are best effort: one that fails is not repeated, because the next one says more, and the conversation
-    notices by itself that a robot does not answer. A robot that is too old for them is not asked again on
-    this connection.
+    notices by itself that a robot does not answer. After a request that failed, none is taken for a while. A
+    robot that is too old for them is not asked again on this connection.
 
     Args:
         picture: returns the report on the picture that is shown; None while there is none to report.
@@ -36,8 +43,14 @@ class ViewerFeedback:
         self._picture = picture
         self._requested = asyncio.Event()
         self._newest_pts: int | None = None
-        self.takes_requests = False
-        """Whether a request for a key frame reaches a robot that knows it."""
+        self._known = False
+        """Whether there is a connection, to a robot that knows requests for key frames."""
+        self._failed_until_s = 0.0
+
+    @property
+    def takes_requests(self) -> bool:
+        """Whether a request for a key frame has a prospect: it is known, and did not fail just now."""
+        return self._known and time.monotonic() >= self._failed_until_s
 
     def request_key_frame(self, newest_pts: int | None) -> None:
         """Requests a key frame after the newest frame of which anything has arrived."""
@@ -47,7 +60,7 @@ class ViewerFeedback:
     async def run(self, client: FeedbackClient) -> None:
         """Runs until cancelled."""
         self._requested.clear()
-        self.takes_requests = True
+        self._known, self._failed_until_s = True, 0.0
         try:
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self._send_requests(client))
@@ -55,27 +68,38 @@ class ViewerFeedback:
                 # Its end would be taken for that of the connection.
                 await asyncio.Event().wait()
         finally:
-            self.takes_requests = False
+            self._known = False
 
     async def _send_requests(self, client: FeedbackClient) -> None:
-        while self.takes_requests:
+        bucket = TokenBucket(_BURST, time.monotonic())
+        while self._known:
             await self._requested.wait()
+            if not _take(bucket):
+                await asyncio.sleep(_REQUEST_EVERY_S)
+                _take(bucket)
             self._requested.clear()
-            self.takes_requests = await _is_known(client.request_key_frame(self._newest_pts))
-            await asyncio.sleep(_LEAST_BETWEEN_REQUESTS_S)
+            await self._send_request(client)
+
+    async def _send_request(self, client: FeedbackClient) -> None:
+        try:
+            async with asyncio.timeout(_ANSWERED_WITHIN_S):
+                await client.request_key_frame(self._newest_pts)
+        except Unsupported:
+            self._known = False
+        except (GatewayError, TimeoutError):
+            self._failed_until_s = time.monotonic() + _FAILED_FOR_S
 
     async def _send_reports(self, client: FeedbackClient) -> None:
-        known = True
-        while known:
+        while True:
             await asyncio.sleep(_REPORT_S)
             if report := self._picture():
-                known = await _is_known(client.report_picture(report))
+                try:
+                    await client.report_picture(report)
+                except Unsupported:
+                    return
+                except GatewayError:
+                    continue  # The next one says more.
 
 
-async def _is_known(call: Coroutine[Any, Any, object]) -> bool:
-    """Makes a call; returns whether the robot knows its method."""
-    try:
-        await call
-    except GatewayError as error:
-        return not isinstance(error, Unsupported)
-    return True
+def _take(bucket: TokenBucket) -> bool:
+    return bucket.take(time.monotonic(), capacity=_BURST, refill_per_s=1 / _REQUEST_EVERY_S)

@@ -117,13 +117,17 @@ class Worker:
         clock = self.latest().clock
         return clock.offset(time.monotonic()) if clock else None
 
+    def takes_requests(self) -> bool:
+        """Returns whether a request for a key frame has a prospect: the robot answers, and serves them."""
+        return self._feedback.takes_requests and self.latest().link.state is LinkState.CONNECTED
+
     def request_key_frame(self, newest_pts: int | None) -> bool:
         """Requests a key frame, for a picture that lost packets have torn.
 
         Returns:
-            Whether it is requested: the robot answers, and is not too old for it.
+            Whether it is requested.
         """
-        if not self._feedback.takes_requests or self.latest().link.state is not LinkState.CONNECTED:
+        if not self.takes_requests():
             return False
         self._call_soon(partial(self._feedback.request_key_frame, newest_pts))
         return True

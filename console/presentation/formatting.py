@@ -8,7 +8,7 @@ from common import units
 UNKNOWN: Final = "-"
 
 _SECOND_MS: Final = 1000
-_CLOCK_FORM: Final = "%Y-%m-%d %H:%M:%S"
+_CLOCK_FORM: Final = "%Y-%m-%d %H:%M:%S %Z"
 _MINUTE_S: Final = 60
 _HOUR_S: Final = 3600
 _GIB: Final = 1 << 30
@@ -41,7 +41,7 @@ def age(age_ms: int | None) -> str:
 
 
 def wall_clock(unix_ms: int, zone: tzinfo | None = None, form: str = _CLOCK_FORM) -> str:
-    """Returns a time since 1970 UTC in a time zone, or this computer's: 2026-11-21 23:59:59.
+    """Returns a time since 1970 UTC in a time zone, or this computer's: 2026-11-21 23:59:59 UTC.
 
     One that the calendar does not have (a robot may send any number) is unknown.
     """
@@ -81,6 +81,19 @@ def plural(count: int | None, noun: str) -> str:
 def sentence(words: str) -> str:
     """Returns words with a capital letter at their beginning; all others stay as they are."""
     return words[:1].upper() + words[1:]
+
+
+def with_component(component: str, message: str) -> str:
+    """Returns a message with its component before it, unless it names the component itself."""
+    named = component.casefold() in message.casefold()
+    return message if named else f"{component}: {message}"
+
+
+def without_component(component: str, message: str) -> str:
+    """Returns a message that stands beside its component: without that at its beginning, where it has it."""
+    prefix = f"{component}:"
+    named = component and message.casefold().startswith(prefix.casefold())
+    return message[len(prefix) :].strip() if named else message
 
 
 def joined(*parts: str) -> str:

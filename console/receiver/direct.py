@@ -6,12 +6,13 @@ import time
 from contextlib import closing
 from typing import Final
 
+from console.name_lookup import resolve
 from console.receiver.address import StreamAddress
 from console.receiver.delivery import Delivery, DeliveryChoice
-from console.receiver.errors import StreamError, from_srt, undecodable
+from console.receiver.errors import StreamError, from_srt, undecodable, unresolved
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.libsrt import SrtError, SrtSocket, load
-from console.receiver.options import ReceiverOptions
+from console.receiver.options import CLOSES_WITHIN_S, ReceiverOptions
 from console.receiver.reception import Reception
 from console.receiver.transport_stream import UnknownVideoError
 from console.receiver.unit_decoder import UnitDecoder
@@ -21,6 +22,7 @@ _HANDSHAKE_POLL_S: Final = 0.002
 _UNEXPLAINED_S: Final = 3.0
 """As long as SRT tries one handshake (SRTO_CONNTIMEO)."""
 _UNEXPLAINED_PAUSE_S: Final = 0.1
+_RESOLVES_WITHIN_S: Final = 3.0
 
 
 class DirectConnection:
@@ -53,10 +55,20 @@ class DirectConnection:
         self._thread = threading.Thread(target=self._run, name="receiver", daemon=True)
         self._thread.start()
 
-    def close(self) -> None:
-        """Disconnects. Afterwards nothing reaches the queue."""
+    @property
+    def received_s(self) -> float | None:
+        """When the newest frame was received, on `time.monotonic()`; None before the first."""
+        return self._decoder.newest_s
+
+    def close(self) -> bool:
+        """Disconnects. Afterwards nothing reaches the queue.
+
+        Returns:
+            Whether that took less than `CLOSES_WITHIN_S`. A driver that hangs is left behind with its thread.
+        """
         self._stopping.set()
-        self._thread.join()
+        self._thread.join(CLOSES_WITHIN_S)
+        return not self._thread.is_alive()
 
     # On the receiver's thread.
 
@@ -73,8 +85,8 @@ class DirectConnection:
     def _receive(self) -> None:
         """Receives over one connection until it is to be made anew, or closed."""
         address = self._address
+        host = self._resolved()
         try:
-            host = _resolved(address)
             connection = SrtSocket(host, address.port, address.latency_ms, address.passphrase)
             with closing(connection):
                 if self._is_established(connection):
@@ -82,6 +94,16 @@ class DirectConnection:
         except (SrtError, OSError) as error:
             reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
             raise from_srt(address, reason, had_data=self._had_data) from error
+
+    def _resolved(self) -> str:
+        """Returns the numeric address of the host, IPv4 where there is one."""
+        address = self._address
+        try:
+            found = resolve(address.host, address.port, socket.SOCK_DGRAM, _RESOLVES_WITHIN_S, self._stopping)
+        except OSError as error:
+            raise unresolved(address, error) from error
+        ipv4 = [each for each in found if each[0] == socket.AF_INET]
+        return str((ipv4 or found)[0][4][0])
 
     def _is_established(self, connection: SrtSocket) -> bool:
         """Waits for the end of the handshake; returns whether it succeeded, or raises why it failed.
@@ -111,14 +133,3 @@ class DirectConnection:
 
     def _report(self, delivery: Delivery) -> None:
         self.delivery = delivery
-
-
-def _resolved(address: StreamAddress) -> str:
-    """Returns the numeric address of the host, IPv4 where there is one.
-
-    Raises:
-        OSError: the name is unknown.
-    """
-    found = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_DGRAM)
-    ipv4 = [each for each in found if each[0] == socket.AF_INET]
-    return str((ipv4 or found)[0][4][0])

@@ -56,6 +56,31 @@ def from_srt(address: StreamAddress, detail: str, *, had_data: bool) -> StreamEr
     )
 
 
+def unresolved(address: StreamAddress, error: OSError) -> StreamError:
+    """Returns the error of a host without an address."""
+    return StreamRefusedError(
+        f"no stream from {address.uri}: the name does not resolve: {error.strerror or error}",
+        f"Use the robot's address instead (--target ADDRESS), or type: getent hosts {address.host}",
+    )
+
+
+def hung(within_s: float) -> StreamError:
+    """Returns the error of a connection that can't be closed, as with a driver that hangs."""
+    return StreamError(
+        f"the receiver did not stop within {within_s:g} s",
+        "Another one takes its place; if it happens again, close the window and open it again",
+    )
+
+
+def hung_too_often(times: int) -> StreamError:
+    """Returns the error of the last connection of that kind."""
+    return StreamError(
+        f"{times} receivers did not stop, as with a decoder's driver that hangs",
+        "Close the window and open it again",
+        final=True,
+    )
+
+
 def ended(address: StreamAddress, reason: str = "") -> StreamEndedError:
     """Returns the error of a stream that was received and then ended."""
     why = f" ({reason})" if reason else ""

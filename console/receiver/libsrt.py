@@ -134,13 +134,14 @@ class SrtSocket:
     def __init__(self, host: str, port: int, latency_ms: int, passphrase: str) -> None:
         self._srt = load()
         family, target = _sockaddr(host, port)
-        self._socket = self._check(self._srt.srt_create_socket())
         self._udp = socket.socket(family, socket.SOCK_DGRAM)
+        self._socket = _ERROR
         self._poll = select.poll()
         self._payload = ctypes.create_string_buffer(LONGEST_PAYLOAD)
         self._control = _MsgCtrl()
         self._event, self._event_size = ctypes.c_int32(), ctypes.c_int(4)
         try:
+            self._socket = self._check(self._srt.srt_create_socket())
             for option, value in ((_TSBPDMODE, 0), (_TLPKTDROP, 0), (_RCVSYN, 0), (_LATENCY, latency_ms)):
                 self._set(option, struct.pack("i", value))
             if passphrase:

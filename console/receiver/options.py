@@ -12,6 +12,8 @@ from console.receiver.recording import Recording
 RequestKeyFrame: TypeAlias = Callable[[int | None], bool]
 
 MAX_AGE_S: Final = 0.6
+CLOSES_WITHIN_S: Final = 2.0
+"""A connection that takes longer to close hangs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +31,8 @@ class ReceiverOptions:
             none comes. Takes the PTS of the newest frame of which anything has arrived, in ticks; returns
             whether a request is made. On the receiver's thread, so it must only hand over. Without it, or
             where no request is made, the connection is made anew.
+        takes_requests: whether such a request still has a prospect; where it has not, the connection is made
+            anew without waiting for the key frame.
     """
 
     pixels: PixelFormat = PixelFormat.I420
@@ -38,3 +42,4 @@ class ReceiverOptions:
     capture: CaptureClock | None = None
     max_age_s: float = MAX_AGE_S
     on_picture_lost: RequestKeyFrame | None = None
+    takes_requests: Callable[[], bool] = lambda: True

@@ -73,7 +73,14 @@ class UnitSink(Protocol):
         """Takes a payload of the stream, in order."""
 
     def push(self, unit: AccessUnit) -> bool:
-        """Decodes an access unit; returns whether it was taken."""
+        """Decodes an access unit; returns whether it was taken. Where not, a key frame is taken next."""
+
+    def feed(self) -> None:
+        """Goes on decoding what was taken; to be called often."""
+
+    @property
+    def dropped_units(self) -> int:
+        """Access units so far that were not taken, or taken in vain."""
 
     def check(self) -> None:
         """Raises the decoder's error, if there is one."""
@@ -108,6 +115,9 @@ class Reception:
         self._age = AgeBound(options.max_age_s)
         self._pts = Unwrapped()
         self._newest: AccessUnit | None = None
+        self._behind = False
+        """Whether the decoder was too slow, and waits for a key frame."""
+        self._dropped_before = sink.dropped_units
         self._statistics: LinkStatistics | None = None
         self._report_s = 0.0
         self._settled_s = time.monotonic() + _FIRST_S
@@ -120,6 +130,8 @@ class Reception:
         """Since when no frame can be shown."""
         self._request_s = 0.0
         """When a key frame is to be requested, while none can be shown."""
+        self._requested = False
+        """Whether the last request is on its way."""
         self.had_data = False
         """Whether anything has arrived."""
 
@@ -136,6 +148,7 @@ class Reception:
                 if self._connection.wait(self._timeout_s()):
                     stopping.wait(_SETTLE_S)
                 self._drain()
+                self._sink.feed()
                 now_s = time.monotonic()
                 if self._is_too_old(now_s) or self._is_stuck(now_s) or self._needs_rejoin(now_s):
                     self._totals = replace(self._totals, rejoins=self._totals.rejoins + 1)
@@ -165,11 +178,11 @@ class Reception:
             self._sink.record(each.payload)
             for unit in self._stream.feed(each.payload):
                 self._newest = unit
-                if self._sink.push(unit):
-                    self._taken_s = time.monotonic()
-                else:
+                self._behind = not self._sink.push(unit)
+                if self._behind:
                     self._stream.damage()
-                    self._stream.dropped_units += 1
+                else:
+                    self._taken_s = time.monotonic()
 
     def _is_too_old(self, now_s: float) -> bool:
         """Whether the newest access unit of those that have just come is too old."""
@@ -195,9 +208,13 @@ class Reception:
         return now_s - self._taken_s > self._options.max_age_s + patience_s
 
     def _needs_rejoin(self, now_s: float) -> bool:
-        """Requests a key frame while no frame can be shown; returns whether only a new connection helps."""
+        """Requests a key frame while no frame can be shown; returns whether only a new connection helps.
+
+        A decoder that is too slow waits for the regular key frame: another one would take bits from all
+        viewers, and make it no faster.
+        """
         stream, request = self._stream, self._options.on_picture_lost
-        if not stream.torn:
+        if not stream.torn or self._behind:
             self._torn_s = None
             return False
         shown = stream.breaks > 0
@@ -207,9 +224,12 @@ class Reception:
             self._torn_s = now_s
             # Before the first frame, the key frame that a new connection gets may be under way.
             self._request_s = now_s if shown else now_s + _REPEAT_S
+        if self._requested and not self._options.takes_requests():
+            self._request_s = now_s
         if now_s < self._request_s:
             return False
-        if request and request(stream.newest_pts):
+        self._requested = request is not None and request(stream.newest_pts)
+        if self._requested:
             self._request_s = now_s + _REPEAT_S
             return False
         return now_s - self._torn_s >= (_REJOIN_AFTER_S if shown else _FIRST_KEY_FRAME_S)
@@ -240,5 +260,8 @@ class Reception:
             waited=totals.waited + self._reorder.waited,
             given_up=totals.given_up + self._reorder.given_up,
             wait_ms=round(self._reorder.wait_s * 1000),
-            dropped_frames=totals.dropped_frames + self._stream.dropped_units,
+            dropped_frames=totals.dropped_frames + self._stream.dropped_units + self._not_decoded(),
         )
+
+    def _not_decoded(self) -> int:
+        return self._sink.dropped_units - self._dropped_before

@@ -5,20 +5,22 @@ import threading
 from collections import deque
 from contextlib import ExitStack
 from dataclasses import replace
-from typing import Any
+from typing import Any, Final
 
 from common.errors import UserError
 from common.gst import GLib, Gst, stop
+from console.name_lookup import resolve
 from console.receiver.address import StreamAddress
 from console.receiver.decoding import CODECS, DecodingBranch, element
 from console.receiver.delivery import Delivery, DeliveryChoice
 from console.receiver.errors import UndecodableError, ended, from_srt, undecodable
 from console.receiver.file_branch import add_file_branch
 from console.receiver.frame_queue import FrameQueue
-from console.receiver.options import ReceiverOptions
+from console.receiver.options import CLOSES_WITHIN_S, ReceiverOptions
 
 _STOP = "stop"
 _BRANCH_GONE = "branch-gone"
+_RESOLVES_WITHIN_S: Final = 3.0
 
 
 class SrtConnection:
@@ -43,6 +45,8 @@ class SrtConnection:
     ) -> None:
         self.delivery = Delivery(kind=DeliveryChoice.SRT, reason=reason)
         """The delivery in use."""
+        self.received_s: float | None = None
+        """Of direct delivery alone it is known when a frame was received."""
         self._address = address
         self._queue = queue
         self._options = options
@@ -57,8 +61,19 @@ class SrtConnection:
         self._bus_reader.start()
         self._pipeline.set_state(Gst.State.PLAYING)
 
-    def close(self) -> None:
-        """Disconnects. Afterwards nothing reaches the queue."""
+    def close(self) -> bool:
+        """Disconnects. Afterwards nothing reaches the queue.
+
+        Returns:
+            Whether that took less than `CLOSES_WITHIN_S`. A driver that hangs is left behind with its thread.
+        """
+        # GStreamer takes no timeout.
+        closing = threading.Thread(target=self._disconnect, name="receiver-close", daemon=True)
+        closing.start()
+        closing.join(CLOSES_WITHIN_S)
+        return not closing.is_alive()
+
+    def _disconnect(self) -> None:
         self._post(_STOP)
         self._bus_reader.join()
         stop(self._pipeline)
@@ -161,8 +176,9 @@ class SrtConnection:
 def _with_ipv4(address: StreamAddress) -> StreamAddress:
     """Returns the address with its host resolved to IPv4 where there is one: GLib would prefer IPv6."""
     try:
-        found = socket.getaddrinfo(address.host, address.port, socket.AF_INET, socket.SOCK_DGRAM)
+        found = resolve(address.host, address.port, socket.SOCK_DGRAM, _RESOLVES_WITHIN_S)
     except OSError:
         # The source resolves the name itself and reports the failure.
         return address
-    return replace(address, host=str(found[0][4][0]))
+    ipv4 = [str(each[4][0]) for each in found if each[0] == socket.AF_INET]
+    return replace(address, host=ipv4[0]) if ipv4 else address

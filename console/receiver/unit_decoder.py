@@ -8,6 +8,7 @@ from common.errors import UserError
 from common.gst import GLib, Gst, stop
 from console.capture_time import Unwrapped, ns_to_ticks, ticks_to_ns
 from console.receiver.address import StreamAddress
+from console.receiver.decoder_queue import DecoderQueue
 from console.receiver.decoding import DecodingBranch, element
 from console.receiver.errors import UndecodableError, undecodable
 from console.receiver.file_branch import add_file_branch
@@ -15,9 +16,10 @@ from console.receiver.frame_queue import FrameQueue
 from console.receiver.options import ReceiverOptions
 from console.receiver.transport_stream import AccessUnit
 
-_MOST_WAITING: Final = 90
-"""Access units that may wait for the decoder: 1.5 s at 60 frames/s. What was held for a lost packet comes at
-once, so it must be more than that; a decoder that is too slow for the stream exceeds any bound."""
+_AHEAD: Final = 2
+"""Access units that the decoder has at hand; further ones wait where they can be dropped."""
+_MOST_DECODING: Final = 32
+"""Access units whose frames may be due at a time: more than any decoder keeps."""
 
 
 class UnitDecoder:
@@ -38,11 +40,14 @@ class UnitDecoder:
         self._options = options
         self._codec = ""
         self._source: Any = None
+        self._waiting = DecoderQueue()
         self._branch: DecodingBranch | None = None
         self._pts = Unwrapped()
         """Over all connections: the decoder's time must not go back."""
         self._received_s: dict[int, float] = {}
         """When the access units that are in the decoder were received, by PTS in ns."""
+        self.newest_s: float | None = None
+        """When the newest access unit was received, decoded or not."""
         self._pipeline = Gst.Pipeline.new(None)
         self._recorder: Any = None
         self._release = ExitStack()
@@ -59,26 +64,35 @@ class UnitDecoder:
             self._recorder.emit("push-buffer", Gst.Buffer.new_wrapped_bytes(GLib.Bytes.new(payload)))
 
     def push(self, unit: AccessUnit) -> bool:
-        """Decodes an access unit, unless too many wait already.
+        """Decodes an access unit, as soon as the decoder has decoded those before it.
 
         Returns:
-            Whether it was taken; the following ones depend on it.
+            Whether it was taken; the following ones depend on it. None are while the decoder is too slow, up
+            to a key frame.
 
         Raises:
             UndecodableError: an element for its codec is not installed.
         """
+        self.newest_s = time.monotonic()
         if unit.codec != self._codec:
+            self._waiting.clear()
             self._change_codec(unit.codec)
-        if self._source.get_property("current-level-buffers") >= _MOST_WAITING:
-            return False
-        buffer = Gst.Buffer.new_wrapped_bytes(GLib.Bytes.new(unit.data))
-        if unit.pts_ticks is not None:
-            buffer.pts = ticks_to_ns(self._pts.ticks(unit.pts_ticks))
-            self._note_received(buffer.pts)
-        if unit.first:
-            buffer.set_flags(Gst.BufferFlags.DISCONT)
-        self._source.emit("push-buffer", buffer)
-        return True
+        taken = self._waiting.put(unit, self.newest_s)
+        self.feed()
+        return taken
+
+    def feed(self) -> None:
+        """Gives the decoder what waits, as far as it has room; to be called often."""
+        while self._source and self._source.get_property("current-level-buffers") < _AHEAD:
+            waiting = self._waiting.take()
+            if waiting is None:
+                return
+            self._decode(*waiting)
+
+    @property
+    def dropped_units(self) -> int:
+        """Access units so far that the decoder was too slow for."""
+        return self._waiting.dropped
 
     def check(self) -> None:
         """Raises the decoder's error.
@@ -95,6 +109,15 @@ class UnitDecoder:
         stop(self._pipeline)
         self._remove_branch()
         self._release.close()
+
+    def _decode(self, received_s: float, unit: AccessUnit) -> None:
+        buffer = Gst.Buffer.new_wrapped_bytes(GLib.Bytes.new(unit.data))
+        if unit.pts_ticks is not None:
+            buffer.pts = ticks_to_ns(self._pts.ticks(unit.pts_ticks))
+            self._note_received(buffer.pts, received_s)
+        if unit.first:
+            buffer.set_flags(Gst.BufferFlags.DISCONT)
+        self._source.emit("push-buffer", buffer)
 
     def _change_codec(self, codec: str) -> None:
         self._remove_branch()
@@ -113,9 +136,9 @@ class UnitDecoder:
             # It holds a method of ours: without this only a collector frees both, and GStreamer's sockets.
             self._branch = None
 
-    def _note_received(self, pts_ns: int) -> None:
-        self._received_s[pts_ns] = time.monotonic()
-        if len(self._received_s) > 2 * _MOST_WAITING:
+    def _note_received(self, pts_ns: int, received_s: float) -> None:
+        self._received_s[pts_ns] = received_s
+        if len(self._received_s) > _MOST_DECODING:
             # Of a frame that the decoder has dropped.
             self._received_s.pop(next(iter(self._received_s)), None)
 

@@ -52,6 +52,11 @@ class DiscoveredRobot:
         """A name that `robotctl robots add` accepts."""
         return plain_name(self.name, _LONGEST_NAME, also="_").lower()
 
+    @property
+    def login_command(self) -> str:
+        """What stores a login for it; FILE is what its administrator has given."""
+        return f"robotctl login {self.nickname} {self.target} FILE"
+
 
 class Discovery:
     """A search that lasts as long as its `with` block; `robots` is what was found so far.

@@ -9,6 +9,7 @@ authority:
 -----BEGIN CERTIFICATE-----
 """
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -23,6 +24,7 @@ from console.robots.robots_file_edit import put_robot
 
 _HEAD: Final = "# Robot Gateway login 1"
 _WORDS: Final = ("robot", "name", "role", "token")
+_TOKEN: Final = re.compile(r"rgt-([0-9a-f]{12})\.")
 _PARTS: Final = ("authority", "certificate", "key")
 
 
@@ -39,6 +41,12 @@ class Login:
     name: str
     role: str
     credentials: Credentials = field(repr=False)
+
+    @property
+    def revoked_by(self) -> str:
+        """What revokes this login alone: the ID in its token; without a token the user's name."""
+        token = _TOKEN.match(self.credentials.token or "")
+        return token[1] if token else self.name
 
 
 def parse_login(text: str) -> Login:

@@ -6,7 +6,8 @@ from typing import Final
 
 from common.errors import UserError
 from console.receiver.decoder_probe import HARDWARE, proven_decoder
-from console.receiver.errors import StreamError, UndecodableError
+from console.receiver.errors import StreamError, UndecodableError, hung
+from console.receiver.options import CLOSES_WITHIN_S
 
 _TRIALS_TIMEOUT_S: Final = 3.0
 """How long the first connection waits for trials; after that it begins in software."""
@@ -45,6 +46,14 @@ class Decoders:
             return error
         self._software_only = True
         return StreamError(f"hardware decoding failed: {error.what}", "Software takes over")
+
+    def after_hang(self) -> StreamError:
+        """Returns the error of a connection that could not be closed.
+
+        The driver of a hardware decoder may hang: the session falls back to software, once and for all.
+        """
+        self.after_no_frame()
+        return hung(CLOSES_WITHIN_S)
 
     def after_no_frame(self) -> None:
         """Falls back to software after a connection without any frame: a hung decoder looks like that."""

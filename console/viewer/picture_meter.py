@@ -13,7 +13,14 @@ from typing import Final
 from console.client import Offset, PictureDelivery, PictureReport, PreviewStatus
 from console.receiver.delivery import Delivery, DeliveryChoice
 from console.receiver.frame import Frame
-from console.viewer.picture_reading import AgeCause, PictureReading, ShownPicture, age_now_ms, reading
+from console.viewer.picture_reading import (
+    AgeCause,
+    PictureReading,
+    ShownPicture,
+    age_now_ms,
+    link_age_ms,
+    reading,
+)
 
 _KEPT: Final = 3600
 """Pictures: a minute at 60 frames/s."""
@@ -51,6 +58,7 @@ class PictureMeter:
         clock_offset: returns the offset of the robot's clock; None while it is not known.
         delivery: returns how packets are delivered.
         preview: returns the robot's latest status; None before the first.
+        received: returns when the newest picture was received; None if unknown.
     """
 
     def __init__(
@@ -58,13 +66,17 @@ class PictureMeter:
         clock_offset: Callable[[], Offset | None],
         delivery: Callable[[], Delivery | None] = lambda: None,
         preview: Callable[[], PreviewStatus | None] = lambda: None,
+        received: Callable[[], float | None] = lambda: None,
     ) -> None:
         self._clock_offset = clock_offset
         self._delivery = delivery
         self._preview = preview
+        self._received = received
         self._viewer_id = secrets.token_hex(4)
         self._lock = threading.Lock()
         self._shown: deque[ShownPicture] = deque(maxlen=_KEPT)
+        self._latest: ShownPicture | None = None
+        """The picture on the screen; None while none is, or its age is unknown."""
         self._reported_s = 0.0
 
     def robot_now_ns(self) -> int | None:
@@ -86,20 +98,22 @@ class PictureMeter:
         picture = ShownPicture(now_s, max(0.0, age_ms), offset.error_s * _MS_PER_S, own_ms, frame.capture_ns)
         with self._lock:
             self._shown.append(picture)
+            self._latest = picture
 
     def forget(self) -> None:
-        """Notes that no picture is on the screen any more."""
+        """Notes that no picture is on the screen any more; history and summary keep those that were."""
         with self._lock:
-            self._shown.clear()
+            self._latest = None
 
     def reading(self) -> PictureReading:
         """Returns the reading of this moment."""
-        return reading(self.latest(), self._delivery(), self._preview(), time.monotonic())
+        shown, now_s = self.latest(), time.monotonic()
+        return reading(shown, self._delivery(), self._preview(), now_s, self._received())
 
     def latest(self) -> ShownPicture | None:
         """Returns the latest picture of known age; None when none is on the screen."""
         with self._lock:
-            return self._shown[-1] if self._shown else None
+            return self._latest
 
     def capture_ns(self) -> int | None:
         """Returns when the picture on the screen was captured, on the robot's monotonic clock, in ns.
@@ -123,6 +137,14 @@ class PictureMeter:
                 worst[slot] = max(worst[slot] or 0.0, picture.age_ms)
         return worst
 
+    def worst_ms(self, within_s: float) -> float | None:
+        """Returns the largest age of the last `within_s` seconds; None when no picture is on the screen."""
+        now_s, latest = time.monotonic(), self.latest()
+        if latest is None:
+            return None
+        recent = takewhile(lambda each: each.at_s > now_s - within_s, reversed(self._pictures()))
+        return max([age_now_ms(latest, now_s), *(each.age_ms for each in recent)])
+
     def summary(self) -> AgeSummary | None:
         """Returns the ages of the last pictures; None without one of known age."""
         pictures = self._pictures()
@@ -141,26 +163,28 @@ class PictureMeter:
         )
 
     def report(self) -> PictureReport | None:
-        """Returns the worst age since the last report; None without a picture of known age."""
+        """Returns the worst age since the last report; None when no picture of known age is on the screen."""
         now_s = time.monotonic()
         since_s, self._reported_s = self._reported_s, now_s
-        pictures = self._pictures()
-        if not pictures:
+        latest = self.latest()
+        if latest is None:
             return None
-        ages_ms = [age_now_ms(pictures[-1], now_s)]
-        ages_ms += [each.age_ms for each in takewhile(lambda each: each.at_s > since_s, reversed(pictures))]
+        since = list(takewhile(lambda each: each.at_s > since_s, reversed(self._pictures())))
+        age_ms = max([age_now_ms(latest, now_s), *(each.age_ms for each in since)])
+        of_link_ms = max([link_age_ms(latest, now_s, self._received()), *(each.link_ms for each in since)])
         delivery = self._delivery()
         rtt_ms = delivery.rtt_ms if delivery else None
         direct = delivery is not None and delivery.kind is DeliveryChoice.DIRECT
         return PictureReport(
             viewer_id=self._viewer_id,
-            picture_age_ms=min(_LONGEST_MS, round(max(ages_ms))),
-            picture_age_error_ms=min(_LONGEST_MS, round(pictures[-1].error_ms)),
+            picture_age_ms=min(_LONGEST_MS, round(age_ms)),
+            picture_age_error_ms=min(_LONGEST_MS, round(latest.error_ms)),
             rtt_ms=None if rtt_ms is None else min(_LONGEST_MS, round(rtt_ms)),
             loss_percent=delivery.loss_percent if delivery else None,
             packets_held=delivery.waited if delivery else 0,
             packets_given_up=delivery.given_up if delivery else 0,
             delivery=PictureDelivery.DIRECT if direct else PictureDelivery.SRT_LATENCY,
+            link_age_ms=min(_LONGEST_MS, round(of_link_ms)),
         )
 
     def _pictures(self) -> tuple[ShownPicture, ...]:

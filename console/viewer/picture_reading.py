@@ -48,6 +48,11 @@ class ShownPicture:
     own_ms: float | None
     capture_ns: int
 
+    @property
+    def link_ms(self) -> float:
+        """`age_ms` as far as the link may have caused it."""
+        return max(0.0, self.age_ms - (self.own_ms or 0.0))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PictureReading:
@@ -92,7 +97,11 @@ class PictureReading:
 
 
 def reading(
-    shown: ShownPicture | None, delivery: Delivery | None, preview: PreviewStatus | None, now_s: float
+    shown: ShownPicture | None,
+    delivery: Delivery | None,
+    preview: PreviewStatus | None,
+    now_s: float,
+    received_s: float | None = None,
 ) -> PictureReading:
     """Returns the reading at one moment.
 
@@ -101,6 +110,7 @@ def reading(
         delivery: how its packets come.
         preview: the robot's latest status.
         now_s: on `time.monotonic()`.
+        received_s: when the newest picture was received, decoded or not; None if unknown.
     """
     rtt_ms = delivery.rtt_ms if delivery else None
     loss_percent = delivery.loss_percent if delivery else None
@@ -109,7 +119,7 @@ def reading(
     age_ms, cause = age_now_ms(shown, now_s), None
     if age_ms >= PICTURE_AGE_MS.warning:
         overdue = now_s - shown.at_s > OVERDUE_S
-        cause = _missing_at(preview) if overdue else _slowest(shown, preview)
+        cause = _missing_at(preview, received_s, now_s) if overdue else _slowest(shown, preview)
     return PictureReading(
         age_ms=age_ms, error_ms=shown.error_ms, cause=cause, rtt_ms=rtt_ms, loss_percent=loss_percent
     )
@@ -121,8 +131,23 @@ def age_now_ms(shown: ShownPicture, now_s: float) -> float:
     return shown.age_ms + (since_s * _MS_PER_S if since_s > OVERDUE_S else 0.0)
 
 
-def _missing_at(preview: PreviewStatus | None) -> AgeCause:
+def link_age_ms(shown: ShownPicture, now_s: float, received_s: float | None) -> float:
+    """Returns the age now as far as the link may have caused it, in ms: without waiting on this computer.
+
+    Args:
+        shown: the picture on the screen.
+        now_s: on `time.monotonic()`.
+        received_s: when the newest picture was received, decoded or not; None if unknown.
+    """
+    silent_s = now_s - max(shown.at_s, received_s or 0.0)
+    missing_ms = silent_s * _MS_PER_S if silent_s > OVERDUE_S else 0.0
+    return shown.link_ms + missing_ms
+
+
+def _missing_at(preview: PreviewStatus | None, received_s: float | None, now_s: float) -> AgeCause:
     """Returns where the next picture is missing."""
+    if received_s is not None and now_s - received_s <= OVERDUE_S:
+        return AgeCause.DECODER
     waited_ms = _newest_on_robot_ms(preview)
     frozen = waited_ms is not None and waited_ms > OVERDUE_S * _MS_PER_S
     return AgeCause.CAMERA if frozen else AgeCause.LINK

@@ -63,7 +63,7 @@ class RobotVideo:
             captured=self._captured,
             pictures=Thumbnails(),
         )
-        self.meter = PictureMeter(self.worker.clock_offset, self._delivery, self._preview)
+        self.meter = PictureMeter(self.worker.clock_offset, self._delivery, self._preview, self._received)
         """Ages of the pictures; what shows them notes them here."""
         self.session = VideoSession(
             pixels=pixels,
@@ -72,6 +72,7 @@ class RobotVideo:
             delivery=delivery,
             robot_now_ns=self.meter.robot_now_ns,
             on_picture_lost=self.worker.request_key_frame,
+            takes_requests=self.worker.takes_requests,
             connect=receive,
         )
 
@@ -103,6 +104,9 @@ class RobotVideo:
 
     def _delivery(self) -> Delivery | None:
         return self.session.delivery()
+
+    def _received(self) -> float | None:
+        return self.session.received_s()
 
     def _preview(self) -> PreviewStatus | None:
         snapshot = self.worker.latest().snapshot

@@ -3,7 +3,6 @@
 import threading
 import time
 from collections.abc import Callable
-from contextlib import closing
 from dataclasses import replace
 from typing import Final, Protocol, TypeAlias
 
@@ -12,7 +11,7 @@ from console.capture_time import CaptureClock
 from console.client import GatewayError, PreviewState, PreviewStatus
 from console.receiver.address import StreamAddress
 from console.receiver.delivery import Delivery, DeliveryChoice
-from console.receiver.errors import StreamError, UndecodableError, no_frame_within
+from console.receiver.errors import StreamError, UndecodableError, hung_too_often, no_frame_within
 from console.receiver.frame import Frame, PixelFormat
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.options import ReceiverOptions, RequestKeyFrame
@@ -27,6 +26,8 @@ from console.viewer.redial import (
     redial_backoff,
 )
 
+_MOST_HUNG: Final = 3
+"""Connections that may be left behind: each keeps a thread, and maybe a driver."""
 _POLL_S: Final = 0.1
 """Period, while no frame comes, of checking whether the connection is still needed."""
 
@@ -41,8 +42,12 @@ class OpenConnection(Protocol):
     def delivery(self) -> Delivery:
         """The delivery in use, with its figures."""
 
-    def close(self) -> None:
-        """Disconnects; afterwards nothing reaches the queue."""
+    @property
+    def received_s(self) -> float | None:
+        """When the newest frame was received, decoded or not, on `time.monotonic()`; None if unknown."""
+
+    def close(self) -> bool:
+        """Disconnects; afterwards nothing reaches the queue. Returns whether it ended in time."""
 
 
 Connect: TypeAlias = Callable[[StreamAddress, FrameQueue, ReceiverOptions], OpenConnection]
@@ -78,6 +83,7 @@ class VideoSession:
         robot_now_ns: reads the estimate of the robot's monotonic clock, in ns; None while there is none.
             Without it frames have no capture time.
         on_picture_lost: requests a key frame; see `ReceiverOptions`. Without it the receiver connects anew.
+        takes_requests: whether such a request still has a prospect.
         connect: opens connections; tests pass a double.
     """
 
@@ -90,6 +96,7 @@ class VideoSession:
         delivery: DeliveryChoice = DeliveryChoice.AUTO,
         robot_now_ns: RobotTime | None = None,
         on_picture_lost: RequestKeyFrame | None = None,
+        takes_requests: Callable[[], bool] = lambda: True,
         connect: Connect = open_connection,
     ) -> None:
         self._pixels = pixels
@@ -98,8 +105,11 @@ class VideoSession:
         self._delivery = delivery
         self._robot_now_ns = robot_now_ns
         self._on_picture_lost = on_picture_lost
+        self._takes_requests = takes_requests
         self._connect = connect
         self._connection: OpenConnection | None = None
+        self._hung = 0
+        """Connections that were left behind, because they could not be closed."""
         self._backoff = redial_backoff()
         self._changed = threading.Condition()
         self._inputs = PlaybackInputs()
@@ -166,6 +176,11 @@ class VideoSession:
         connection = self._connection
         return connection.delivery if connection else None
 
+    def received_s(self) -> float | None:
+        """Returns when the newest frame was received, decoded or not; None if unknown."""
+        connection = self._connection
+        return connection.received_s if connection else None
+
     def close(self, timeout_s: float = 2.0) -> bool:
         """Disconnects. Returns whether the thread ended in time. Closing again does nothing."""
         with self._changed:
@@ -182,6 +197,10 @@ class VideoSession:
             address = self._address
             if address is None:
                 self._wait(lambda: self._address is not None)
+                continue
+            if self._hung >= _MOST_HUNG:
+                self._update(stream_error=hung_too_often(self._hung), blocked=True)
+                self._wait(lambda: self._address != address)  # noqa: B023 - called at once
                 continue
             error = self._receive(address)
             if self._closing or address != self._address:
@@ -200,8 +219,13 @@ class VideoSession:
         except UserError as error:
             return error
         self._connection = connection
-        with closing(connection):
+        try:
             end = self._take_frames(connection, queue, address)
+        finally:
+            closed = connection.close()
+        if not closed:
+            self._hung += 1
+            return self._decoders.after_hang()
         return self._decoders.after_undecodable(end) if isinstance(end, UndecodableError) else end
 
     def _options(self, address: StreamAddress) -> ReceiverOptions:
@@ -215,6 +239,7 @@ class VideoSession:
             self._delivery,
             capture,
             on_picture_lost=self._on_picture_lost,
+            takes_requests=self._takes_requests,
         )
 
     def _take_frames(

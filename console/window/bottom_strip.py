@@ -31,9 +31,11 @@ class BottomStrip(QWidget):
         fill(QHBoxLayout(self), (self.preview, 1), self.driving, spacing=20, margins=(8, 4, 8, 4))
         self.setFixedHeight(_HEIGHT_PX)
 
-    def show_teleop(self, teleop: Teleop, view: DriverView, latch: StopLatch | None) -> None:
-        """Makes room for driving on a robot that has it."""
-        self.driving.show_teleop(teleop, view, latch)
+    def show_teleop(
+        self, teleop: Teleop, view: DriverView, latch: StopLatch | None, *, known: bool = True
+    ) -> None:
+        """Makes room for driving on a robot that has it; see `DrivePlace.show_teleop`."""
+        self.driving.show_teleop(teleop, view, latch, known=known)
         self._arrange()
 
     def show_preview(self, shown: bool) -> None:

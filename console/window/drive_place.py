@@ -53,24 +53,28 @@ class DrivePlace(QWidget):
         self.reset.clicked.connect(self.press_reset)
         self.setVisible(False)
 
-    def show_teleop(self, teleop: Teleop, view: DriverView, latch: StopLatch | None) -> None:
+    def show_teleop(
+        self, teleop: Teleop, view: DriverView, latch: StopLatch | None, *, known: bool = True
+    ) -> None:
         """Shows the robot's limits and what can be pressed; nothing on a robot without teleoperation.
 
         Args:
             teleop: of the status.
             view: of this window's own driving.
             latch: the stop that is shown, and that Reset is for.
+            known: whether the robot answers; else all this is what was last known. STOP works in any case.
         """
+        last_known = "" if known else ", last known"
         self.setVisible(teleop.state is not TeleopState.UNKNOWN)
-        set_text(self.state, f"Driving {teleop.state.value}")
+        set_text(self.state, f"Driving {teleop.state.value}{last_known}")
         linear, angular = quantity(teleop.max_linear_mps, "m/s"), quantity(teleop.max_angular_rad_s, "rad/s")
         set_text(self.limits, f"at most {linear}, {angular}")
-        self.setAccessibleName(f"Driving {teleop.state.value}, {self.limits.text()}")
+        self.setAccessibleName(f"{self.state.text()}, {self.limits.text()}")
         set_text(self.drive, "End driving" if view.open else "Opening ..." if view.opening else "Drive")
-        self.drive.setEnabled(view.open or (teleop.enabled and not view.opening))
-        self.enable.setEnabled(not teleop.enabled)
+        self.drive.setEnabled(view.open or (known and teleop.enabled and not view.opening))
+        self.enable.setEnabled(known and not teleop.enabled)
         for entry in self.begins:
-            entry.setEnabled(teleop.enabled and not (view.open or view.opening))
+            entry.setEnabled(known and teleop.enabled and not (view.open or view.opening))
         self._latch = latch
         set_text(self.reset, f"Reset stop {latch.stop_id}" if latch else "Reset")
         self.reset.setEnabled(latch is not None)

@@ -62,10 +62,11 @@ class Driving(QObject):
         if state.snapshot:
             teleop, view = state.snapshot.status.teleop, self._driver.view()
             self.hands.driveable = teleop.state is not TeleopState.UNKNOWN
-            display = _display(teleop, view, known=not state.outdated(time.monotonic()))
+            known = not state.outdated(time.monotonic())
+            display = _display(teleop, view, known=known)
             if self.hands.pad:
                 self._show_pad(self.hands.pad)
-            self._strip.show_teleop(teleop, view, _latch(display))
+            self._strip.show_teleop(teleop, view, _latch(display), known=known)
             self._picture.show_driving(display)
 
     # Actions of the keys and buttons.

@@ -11,16 +11,17 @@ from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from console.client import PreviewProfile
 from console.monitor.alarm import Alarm, Occurrence
-from console.monitor.history import NOTHING, History, values_of
+from console.monitor.history import History, values_of
 from console.monitor.link import link_text
 from console.monitor.monitor_state import MonitorState, PreviewRequest
 from console.monitor.motion import Motion, motion
 from console.monitor.status_rows import FaultItem
 from console.monitor.trail import Trail
 from console.monitor.worker import Worker
+from console.presentation.own_stream import OwnStream  # noqa: TC001  # read by the type checker alone
 from console.presentation.picture_age import PictureAge, reported_age
 from console.presentation.preview_switch import Note
-from console.presentation.severity_style import FAULT_STYLES
+from console.presentation.severity_style import FAULT_STYLES, SeverityStyle
 from console.robots.roster import RobotChoice, Roster
 from console.viewer.playback import PlaybackState
 from console.window import window_settings
@@ -80,6 +81,10 @@ class MonitorWindow(QWidget):
         self._actions = PreviewActions(worker)
         self.read_picture_age: Callable[[], PictureAge | None] = self.reported_age
         """Reads the age of the picture on the screen; by default from the robot's own report."""
+        self.read_worst_age_ms: Callable[[], float | None] = lambda: None
+        """Reads the largest age of that picture in the last half second; None while it is unknown."""
+        self.read_stream: Callable[[], OwnStream | None] = lambda: None
+        """Reads how the pictures of this window come; None before they do."""
         self._history, self._trail = History(), Trail()
         self._motion: Motion | None = None
         self._dismissed: PreviewRequest | None = None
@@ -122,14 +127,15 @@ class MonitorWindow(QWidget):
         link = link_text(state.link, self._worker.target, now_s)
         playback = self.video.playback()
         frozen_s = None if playback.state is PlaybackState.LIVE else playback.frame_age_s
-        self.header.show_state(state, link, now_s, self.read_picture_age(), frozen_s)
+        stream = self.read_stream()
+        self.header.show_state(state, link, now_s, self.read_picture_age(), frozen_s, stream=stream)
         self.banner.show_item(link)
         controls = self._actions.controls(state, now_s)
         self.preview.show_controls(controls)
         hidden = state.request is not None and state.request is self._dismissed
         self.toasts.show_answers(() if hidden else controls.answers)
         self._show_faults(state)
-        self.side.show_state(state, controls, self.alarm, now_s)
+        self.side.show_state(state, controls, self.alarm, now_s, stream)
         self.driving.show_state(state)
         self.recording.show_state(state)
         self.side.show_recordings_tab(not self.recording.absent)
@@ -254,6 +260,7 @@ class MonitorWindow(QWidget):
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
         """Ends driving, saves the settings, and waits for a file that is being written."""
         self.driving.close()
+        self.header.name.end_search()
         self._timer.stop()
         window_settings.save(self, Choices(self._panel_open, self.alarm.sound_on, str(self.recording.folder)))
         self.saver.job.wait(_SAVES_END_WITHIN_S)
@@ -299,8 +306,8 @@ class MonitorWindow(QWidget):
 
     def _tick(self) -> None:
         state, now_s = self._worker.latest(), time.monotonic()
-        known = state.snapshot and not state.outdated(now_s)
-        self._history.record(now_s, values_of(state.snapshot.status) if known and state.snapshot else NOTHING)
+        status = state.snapshot.status if state.snapshot and not state.outdated(now_s) else None
+        self._history.record(now_s, values_of(self.read_worst_age_ms(), status))
         for plots in (self.plots, self.side.plots):
             plots.show_history(self._history)
         self.refresh()
@@ -331,5 +338,10 @@ class MonitorWindow(QWidget):
             self.toasts.show_passing(note)
 
     def _open_other(self, choice: RobotChoice) -> None:
+        if choice.login_command:
+            # Without one the next window could only say that the robot refuses it.
+            text = f"{choice.name} needs a login. In a terminal, type: {choice.login_command}"
+            self.toasts.show_passing(Note(text, SeverityStyle.WARNING))
+            return
         self.next_robot = choice
         self.close()

@@ -11,14 +11,18 @@ from PySide6.QtWidgets import QWidget
 from common.errors import UserError
 from console.gamepad.reader import GamepadReader
 from console.monitor.credential_refresh import LoadCredentials
+from console.monitor.history import STEP_S
+from console.presentation.own_stream import OwnStream
 from console.presentation.picture_age import PictureAge
 from console.presentation.preview_switch import Note
 from console.presentation.severity_style import SeverityStyle
 from console.receiver.delivery import DeliveryChoice
 from console.receiver.recording import Recording
 from console.robots.roster import RobotChoice, Roster
+from console.viewer.formatting import delivery_text
 from console.viewer.picture_meter import PictureMeter
 from console.viewer.robot_video import RobotVideo
+from console.viewer.session import VideoSession
 from console.viewer.summary import FrameCounter, ViewSummary
 from console.window.application import application
 from console.window.drive_hands import Pad
@@ -142,6 +146,8 @@ def cockpit(
     # The bar has the age; the card would cover the trail.
     video.show_age(False)
     window.read_picture_age = partial(_age_of, robot.meter, window.reported_age)
+    window.read_worst_age_ms = partial(robot.meter.worst_ms, STEP_S)
+    window.read_stream = partial(_stream_of, robot.session)
     with _open(window, robot):
         yield window
 
@@ -167,6 +173,13 @@ def _age_of(meter: PictureMeter, reported: Callable[[], PictureAge | None]) -> P
     if now.age_ms is None:
         return reported()
     return PictureAge(now.age_ms, now.error_ms, f"longest part: {now.cause.value}" if now.cause else "")
+
+
+def _stream_of(session: VideoSession) -> OwnStream | None:
+    delivery = session.delivery()
+    if delivery is None:
+        return None
+    return OwnStream(delivery_text(delivery), delivery.loss_percent, bool(delivery.reason))
 
 
 @contextmanager

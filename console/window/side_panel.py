@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtWidgets import (
     QBoxLayout,
     QFrame,
@@ -19,8 +19,9 @@ from PySide6.QtWidgets import (
 from console.monitor.alarm import Alarm
 from console.monitor.monitor_state import MonitorState
 from console.monitor.preview_controls import Controls
-from console.monitor.status_rows import component_rows, fault_items
+from console.monitor.status_rows import component_rows, fault_items, stream_rows
 from console.presentation.formatting import age
+from console.presentation.own_stream import OwnStream
 from console.window.events_tab import EventsTab
 from console.window.fault_line import FaultLine
 from console.window.labels import set_bold, set_text
@@ -28,6 +29,7 @@ from console.window.layout import fill
 from console.window.lines import LineList, NoteLine, StatusLine
 from console.window.plot import Plots
 from console.window.recordings_tab import RecordingsTab
+from console.window.theme import PALETTE_CHANGES, with_readable_disabled
 
 WIDTH_PX: Final = 300
 TABS: Final = ("Status", "Events", "Plots", "Recordings")
@@ -61,12 +63,28 @@ class SidePanel(QWidget):
         self.recordings = RecordingsTab()
         self.tabs = QTabWidget()
         self._lay_out()
+        self._colour_disabled()
 
-    def show_state(self, state: MonitorState, controls: Controls, alarm: Alarm, now_s: float) -> None:
-        """Shows the latest state."""
+    def show_state(
+        self,
+        state: MonitorState,
+        controls: Controls,
+        alarm: Alarm,
+        now_s: float,
+        stream: OwnStream | None = None,
+    ) -> None:
+        """Shows the latest state.
+
+        Args:
+            state: of robot and connection.
+            controls: of the preview.
+            alarm: of the faults.
+            now_s: on the monotonic clock.
+            stream: how the pictures of this window come; None before they do.
+        """
         self.faults.show_items(fault_items(state, alarm, now_s))
-        self.notes.show_items(controls.conditions)
-        self.components.show_items(component_rows(state, now_s))
+        self.notes.show_items(controls.beside_faults)
+        self.components.show_items([*component_rows(state, now_s), *stream_rows(stream)])
         outdated = state.snapshot is not None and state.outdated(now_s)
         received = f"as of {age(state.snapshot_age_ms(now_s))} ago" if outdated else ""
         set_text(self.faults_title, f"Faults, {received}" if received else "Faults")
@@ -90,6 +108,17 @@ class SidePanel(QWidget):
         number = TABS.index("Recordings")
         if self.tabs.isTabVisible(number) != shown:
             self.tabs.setTabVisible(number, shown)
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
+        """Follows the desktop from light to dark."""
+        super().changeEvent(event)
+        if event.type() in PALETTE_CHANGES:
+            self._colour_disabled()
+
+    def _colour_disabled(self) -> None:
+        readable = with_readable_disabled(self.palette())
+        if readable != self.palette():
+            self.setPalette(readable)
 
     def _fault_line(self) -> FaultLine:
         line = FaultLine()

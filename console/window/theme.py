@@ -19,13 +19,19 @@ COLOURS: Final[Mapping[SeverityStyle, QColor]] = {
 CURVE_ON_LIGHT: Final = QColor("#0072B2")
 CURVE_ON_DARK: Final = QColor("#56B4E9")
 PALETTE_CHANGES: Final = (QEvent.Type.ApplicationPaletteChange, QEvent.Type.PaletteChange)
-COCKPIT: Final = QPalette(QColor("#22262a"))
-"""Palette of what surrounds the picture, on a light desktop, too: the picture is what is looked at."""
 _INK: Final = QColor("#000000")
 """Ink on a coloured shape: black has a contrast (WCAG 2.1, 1.4.3) of 5 or more on all three."""
 _TINT: Final = 0.16
 _DIM: Final = 0.30
+_DISABLED: Final = 0.45
 _MIDDLE_GREY: Final = 128
+_ACTIVE: Final = QPalette.ColorGroup.Active
+_TEXTS: Final = (
+    (QPalette.ColorRole.WindowText, QPalette.ColorRole.Window),
+    (QPalette.ColorRole.ButtonText, QPalette.ColorRole.Button),
+    (QPalette.ColorRole.Text, QPalette.ColorRole.Base),
+)
+"""Roles of texts, each with that of the ground below it."""
 
 
 def is_dark(palette: QPalette) -> bool:
@@ -53,6 +59,20 @@ def dim_text(palette: QPalette) -> QColor:
     """Returns the colour of secondary text: nearer to the ground, and still easy to read."""
     text, ground = palette.color(QPalette.ColorRole.WindowText), palette.color(QPalette.ColorRole.Window)
     return mixed(text, ground, _DIM)
+
+
+def with_readable_disabled(palette: QPalette) -> QPalette:
+    """Returns a palette in which what is disabled is dim, but can be read: Qt's own can't on dark."""
+    changed = QPalette(palette)
+    for text, ground in _TEXTS:
+        dim = mixed(palette.color(_ACTIVE, text), palette.color(_ACTIVE, ground), _DISABLED)
+        if palette.color(QPalette.ColorGroup.Disabled, text) != dim:
+            changed.setColor(QPalette.ColorGroup.Disabled, text, dim)
+    return changed
+
+
+COCKPIT: Final = with_readable_disabled(QPalette(QColor("#22262a")))
+"""Palette of what surrounds the picture, on a light desktop, too: the picture is what is looked at."""
 
 
 class DimLabel(PlainLabel):

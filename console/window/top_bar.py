@@ -16,6 +16,7 @@ from console.monitor.bar_items import (
 from console.monitor.link import LinkText
 from console.monitor.monitor_state import MonitorState
 from console.presentation.formatting import UNKNOWN
+from console.presentation.own_stream import OwnStream
 from console.presentation.picture_age import PictureAge
 from console.robots.roster import Roster
 from console.window.battery_gauge import BatteryGauge
@@ -53,7 +54,7 @@ class TopBar(QWidget):
         self.battery = Cell("Battery", ("100 %", "LOW, 12.6 V"), self.battery_gauge)
         self.link = Cell("Link", _WIDEST_LINK, Marker())
         self.picture = Cell("Picture", ("1000 \u00b1 10 ms", "LATE, picture age"), Marker())
-        self.mode = Cell("Mode", ("autonomous", "mode"), None)
+        self.mode = Cell("Mode", ("autonomous", "last known"), None)
         self.clock = Cell("Time", ("23:59:59", "UTC+00:00"), None)
         self.panel_button = _button("Panel", "Side panel (F9)", checkable=True)
         self.help_button = _button("?", "Keys (F1)")
@@ -68,6 +69,8 @@ class TopBar(QWidget):
         now_s: float,
         age: PictureAge | None = None,
         frozen_s: float | None = None,
+        *,
+        stream: OwnStream | None = None,
     ) -> None:
         """Shows the latest state.
 
@@ -77,6 +80,7 @@ class TopBar(QWidget):
             now_s: on the monotonic clock.
             age: of the picture on the screen; None while it is unknown.
             frozen_s: how long the picture has been frozen; None while it is not.
+            stream: how the pictures of this window come; None before they do.
         """
         if state.snapshot:
             status = state.snapshot.status
@@ -86,9 +90,9 @@ class TopBar(QWidget):
         self.battery_gauge.show_item(battery)
         self.battery.show_item(battery)
         self.health.show_item(health_item(state, now_s))
-        self.link.show_item(link_item(state, link, now_s))
-        self.picture.show_item(picture_item(age, frozen_s))
-        self.mode.show_item(mode_item(state))
+        self.link.show_item(link_item(state, link, now_s, stream))
+        self.picture.show_item(picture_item(age, frozen_s, stream))
+        self.mode.show_item(mode_item(state, now_s))
         self.clock.show_item(clock_item())
 
     def _lay_out(self) -> None:

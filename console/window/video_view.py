@@ -63,6 +63,8 @@ class VideoView(QWidget):
         self._ready: tuple[QImage, bytes, Frame] | None = None
         """The latest frame as an image, and the memory of its pixels, which must live as long."""
         self._painted: tuple[QImage, bytes, Frame] | None = None
+        self._measured: Frame | None = None
+        """The frame whose age was noted; None while none can be seen."""
         self._banner: Banner | None = banner(session.playback())
         self._shape = (0, 0)
         self._clear_px = 0
@@ -143,11 +145,10 @@ class VideoView(QWidget):
             room = QRectF(self.rect()).adjusted(clear, 0, -clear, 0)
             draw_banner(painter, room, text, over_frame=shown is not None)
         painter.end()
+        self._measure(shown[2] if shown else None)
         if shown is not self._painted:
             self._painted = shown
             self._note_shape(shown[0] if shown else None)
-            if self._meter and shown:
-                self._meter.shown(shown[2])
             self.painted.emit()
 
     def _draw_frame(self, painter: QPainter, image: QImage, box: Box, live: bool) -> None:
@@ -158,6 +159,21 @@ class VideoView(QWidget):
         painter.drawImage(target, image)
         if not live:
             painter.fillRect(target, _VEIL)
+
+    def _measure(self, frame: Frame | None) -> None:
+        """Notes the age of a frame that has just been painted, where it can be seen."""
+        if self._meter and frame and frame is not self._measured and self._can_be_seen():
+            self._measured = frame
+            self._meter.shown(frame)
+
+    def _can_be_seen(self) -> bool:
+        """Whether anything of the widget is on a screen: not while its window is minimised or hidden.
+
+        A window system need not tell that a window is covered by others.
+        """
+        window = self.window()
+        handle = window.windowHandle()
+        return self.isVisible() and not window.isMinimized() and handle is not None and handle.isExposed()
 
     def _note_shape(self, image: QImage | None) -> None:
         shape = (image.width(), image.height()) if image else (0, 0)
@@ -174,6 +190,10 @@ class VideoView(QWidget):
 
     def _check_age(self) -> None:
         """Repaints when the age has changed: it grows while no frame comes."""
+        if self._meter and not self._can_be_seen():
+            # Qt paints no hidden window. An age that only grows would lower the bit rate of all viewers.
+            self._measured = None
+            self._meter.forget()
         if self._age and self._age.refresh():
             self.update()
 

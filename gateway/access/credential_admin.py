@@ -81,9 +81,10 @@ class CredentialAdmin:
             )
         with directory_lock(directory.path):
             if directory.store_file.exists() and not again:
+                listing = credentials_command("list", directory.path)
                 raise UserError(
                     f"{directory.path} already has credentials",
-                    f"Type: {credentials_command('list')}; with --again all of them are discarded",
+                    f"Type: {listing}; with --again all of them are discarded",
                 )
             self._replace_all(hosts, Store())
 
@@ -106,7 +107,7 @@ class CredentialAdmin:
         now_s = int(self.clock())
 
         def change(store: Store) -> tuple[Store, tuple[Credential, ...]]:
-            found = store.find(name_or_id, now_s)
+            found = store.find(name_or_id, now_s, self.directory.path)
             return store.revoking(found, now_s), found
 
         return self.directory.change_store(change)
@@ -124,7 +125,7 @@ class CredentialAdmin:
         now_s = int(self.clock())
 
         def change(store: Store) -> tuple[Store, Issued]:
-            found = store.find(name_or_id, now_s)
+            found = store.find(name_or_id, now_s, self.directory.path)
             if len(found) > 1:
                 ids = ", ".join(each.credential_id for each in found)
                 raise UserError(f"{name_or_id} has {len(found)} credentials: {ids}", "Give the id of one")

@@ -63,7 +63,7 @@ class KeyPairFiles:
         if not matches:
             raise UserError(
                 f"{self.key} is not the key of {self.certificate}",
-                f"To replace both, type: {credentials_command(f'rotate {self.argument}')}",
+                f"To replace both, type: {credentials_command(f'rotate {self.argument}', self.key.parent)}",
             )
         return pair
 

@@ -162,7 +162,10 @@ class CredentialReloader:
         """Returns the state of access control that operators see."""
         now_s = time.time()
         return AccessView(
-            tuple(_certificate_expiry(which, ends_s, now_s) for which, ends_s in self.loaded.ends_s.items()),
+            tuple(
+                _certificate_expiry(which, ends_s, now_s, self._directory.path)
+                for which, ends_s in self.loaded.ends_s.items()
+            ),
             self._error,
             audit_error,
             closed=bool(self.loaded.problem),
@@ -239,12 +242,12 @@ def _signature(path: Path) -> tuple[int, ...]:
     return status.st_mtime_ns, status.st_size, status.st_ino, status.st_mode
 
 
-def _certificate_expiry(which: str, ends_s: int, now_s: float) -> CertificateExpiry:
+def _certificate_expiry(which: str, ends_s: int, now_s: float, directory: Path) -> CertificateExpiry:
     name, argument = _CERTIFICATES[which]
     return CertificateExpiry(
         key=which,
         name=name,
         ends_on=datetime.fromtimestamp(ends_s, UTC).date().isoformat(),
         left_s=ends_s - now_s,
-        remedy=f"On the robot: {credentials_command(f'rotate {argument}')}",
+        remedy=f"On the robot: {credentials_command(f'rotate {argument}', directory)}",
     )

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Final, Literal, TypeAlias
 
@@ -42,8 +43,13 @@ class Store:
         kept[credential.credential_id] = credential
         return Store(MappingProxyType(kept))
 
-    def find(self, name_or_id: str, now_s: float) -> tuple[Credential, ...]:
+    def find(self, name_or_id: str, now_s: float, directory: Path | None = None) -> tuple[Credential, ...]:
         """Returns the credentials of a name or id that are neither revoked nor expired.
+
+        Args:
+            name_or_id: of the credentials.
+            now_s: Unix time.
+            directory: of the list, for the error.
 
         Raises:
             UserError: there are none.
@@ -57,7 +63,7 @@ class Store:
         if not found:
             raise UserError(
                 f"no valid credential has the name or id '{name_or_id}'",
-                f"To list all of them, type: {credentials_command('list')}",
+                f"To list all of them, type: {credentials_command('list', directory)}",
             )
         return found
 

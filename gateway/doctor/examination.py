@@ -83,7 +83,7 @@ def _access(directory: CredentialDirectory, tls: TlsFiles | None) -> Finding:
             "access",
             f"no credential in {directory.path} is valid",
             "Every caller must present one",
-            f"Type: {credentials_command('add NAME --role operator')}",
+            f"Type: {credentials_command('add NAME --role operator', directory.path)}",
         )
     ends = [datetime.fromtimestamp(each, UTC).date().isoformat() for each in loaded.ends_s.values()]
     until = f"; the certificate is valid until {min(ends)}" if ends else ""

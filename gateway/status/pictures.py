@@ -32,6 +32,7 @@ class PictureReport:
         error_ms: bound of the error of `age_ms`.
         packets_held: that waited for a missing one before them.
         packets_given_up: that never came.
+        link_age_ms: `age_ms` without the time that pictures waited on the viewer's computer.
     """
 
     age_ms: int
@@ -41,6 +42,12 @@ class PictureReport:
     packets_held: int
     packets_given_up: int
     delivery: Delivery | None
+    link_age_ms: int | None = None
+
+    @property
+    def of_link_ms(self) -> int:
+        """The age as far as the link may have caused it."""
+        return self.age_ms if self.link_age_ms is None else self.link_age_ms
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,9 +90,9 @@ class PictureReports:
         if not self._reports:
             return NO_PICTURES
         reports = [report for _, report in self._reports.values()]
-        of_link = [r for r in reports if r.age_ms <= LONGEST_OF_LINK_MS]
+        of_link = [report for report in reports if report.of_link_ms <= LONGEST_OF_LINK_MS]
         return Pictures(
             viewer_count=len(reports),
             worst_age_ms=max(report.age_ms for report in reports),
-            link_age_ms=max((max(0, r.age_ms - r.error_ms) for r in of_link), default=None),
+            link_age_ms=max((max(0, each.of_link_ms - each.error_ms) for each in of_link), default=None),
         )

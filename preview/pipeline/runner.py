@@ -30,6 +30,7 @@ from preview.pipeline.file_loop import FileLoop
 from preview.pipeline.framing import Framing
 from preview.pipeline.keyframe_gate import KeyframeGate
 from preview.pipeline.listener import Listener
+from preview.pipeline.picture_age import PictureAge
 from preview.pipeline.plan import Plan
 from preview.pipeline.source_end import SourceEnd
 from preview.pipeline.sources import SourcePlan
@@ -44,8 +45,6 @@ _WINDOW_S: Final = 0.5
 """Window of the statistics, rounded up to a multiple of _CHECK_INTERVAL_S."""
 _DRIVER_DEADLINE_S: Final = 2.0
 """For a call into the encoder's driver while it runs."""
-_PICTURE_AGE_COUNTS_S: Final = 3.0
-"""As the gateway counts a viewer's report."""
 _GRAPH_DEADLINE_S: Final = 0.3
 _MESSAGES: Final = Gst.MessageType.ERROR | Gst.MessageType.WARNING
 
@@ -90,8 +89,7 @@ class Runner:
         self._bus_fd = self._bus.get_pollfd().fd
         self._tasks: dict[str, asyncio.Task[None]] = {}
         """The newest task of each kind."""
-        self._picture_age_ms = 0
-        self._picture_age_at = float("-inf")
+        self._picture_age = PictureAge()
         self._driver_lock = asyncio.Lock()
         self._ended: asyncio.Future[None] = loop.create_future()
         """Done when the pipeline has failed or is being stopped; no event is reported from then on."""
@@ -192,8 +190,10 @@ class Runner:
         return not self._ended.done() and self._keyframe_gate.request_after_loss(newest_pts)
 
     def take_picture_age(self, age_ms: int) -> None:
-        """Takes the age of the oldest picture that a viewer shows; it counts for `_PICTURE_AGE_COUNTS_S`."""
-        self._picture_age_ms, self._picture_age_at = age_ms, time.monotonic()
+        """Takes the age of the oldest picture that a viewer shows; see `PictureAge`."""
+        now = time.monotonic()
+        self._picture_age.note_newest(self._framing.last_frame_age_ms, now)
+        self._picture_age.take(age_ms, now)
 
     async def stop(self) -> "asyncio.Task[bool]":
         """Tears the pipeline down, each part with a deadline.
@@ -347,6 +347,7 @@ class Runner:
                 return
             if self._lost:
                 watchdogs = Watchdogs(now, self._timeouts)  # The next camera's time begins when it is live.
+            self._picture_age.note_newest(self._framing.last_frame_age_ms, now)
             if now - reading.at >= _WINDOW_S or self._is_overwhelmed(now):
                 reading = self._measure(reading)
 
@@ -361,13 +362,10 @@ class Runner:
         self.measurement = statistics.measure(before, now)
         if self.plan.settings.adaptive.enabled:
             links = statistics.measured_links(before, now)
-            self._adapt_bitrate(Sample(self.measurement.bitrate_kbps, links, self._picture_age(now.at)))
+            age_ms = self._picture_age.counting(now.at)
+            self._adapt_bitrate(Sample(self.measurement.bitrate_kbps, links, age_ms))
         self._events.measured(self._listener.take_refused() if self._listener else 0)
         return now
-
-    def _picture_age(self, now: float) -> float | None:
-        """Returns the newest reported age; None where no viewer has reported one lately."""
-        return self._picture_age_ms if now - self._picture_age_at < _PICTURE_AGE_COUNTS_S else None
 
     # --- cameras ---
 

@@ -860,7 +860,8 @@ ADDITIONS = [
         + flt(5, 2.5)
         + uint(6, 300)
         + uint(7, 4)
-        + uint(8, 1),
+        + uint(8, 1)
+        + uint(9, 90),
         {
             "viewer_id": "left screen",
             "picture_age_ms": 140,
@@ -870,6 +871,7 @@ ADDITIONS = [
             "packets_held": 300,
             "packets_given_up": 4,
             "delivery": preview_pb2.PICTURE_DELIVERY_DIRECT,
+            "link_age_ms": 90,
         },
     ),
     Case(robot_gateway_pb2.ReportPictureResponse, b"", {}),

@@ -1,5 +1,6 @@
 """A UDP relay on this machine that behaves like a bad link: delay, loss and a bottleneck, each way."""
 
+import heapq
 import random
 import selectors
 import socket
@@ -7,6 +8,7 @@ import threading
 import time
 from collections import deque
 from dataclasses import dataclass
+from itertools import count
 from types import TracebackType
 from typing import Final, Generic, Self, TypeAlias, TypeVar
 
@@ -17,6 +19,7 @@ _Sent: TypeAlias = tuple[socket.socket, bytes, tuple[str, int]]
 _MAX_WAITING: Final = 4096
 """Packets that wait in one direction; more are dropped, as by a full queue."""
 _MAX_CALLERS: Final = 64
+_KEPT: Final = 64
 _LONGEST_PACKET: Final = 2048
 _CONTROL: Final = 0x80
 """First bit of an SRT packet: set in control packets (draft-sharabayko-srt 3)."""
@@ -32,6 +35,8 @@ class Impairment:
         delay_s: propagation delay in one direction.
         rate_kbps: of the bottleneck; None for no bottleneck.
         queue_s: longest wait before the bottleneck; a packet that would wait longer is dropped.
+        jitter_s: longest further delay, another one for each packet, so that packets overtake each other.
+        duplicates: share of the packets that come twice, 0 to 1.
     """
 
     loss: float = 0.0
@@ -39,6 +44,8 @@ class Impairment:
     delay_s: float = 0.0
     rate_kbps: float | None = None
     queue_s: float = 0.2
+    jitter_s: float = 0.0
+    duplicates: float = 0.0
 
 
 class Direction:
@@ -72,7 +79,17 @@ class Direction:
                 return None
             begin_s += len(packet) * 8 / (link.rate_kbps * 1000)
             self._free_at_s = begin_s
-        return begin_s + link.delay_s
+        return begin_s + link.delay_s + (self._random.uniform(0, link.jitter_s) if link.jitter_s else 0.0)
+
+    @property
+    def keeps_order(self) -> bool:
+        """Whether no packet overtakes another one, also after a change of the delay."""
+        return not self._impairment.jitter_s
+
+    def is_duplicated(self) -> bool:
+        """Returns whether the present packet comes once more."""
+        share = self._impairment.duplicates
+        return share > 0 and self._random.random() < share
 
 
 class UdpLink:
@@ -95,6 +112,8 @@ class UdpLink:
         self.impairment = impairment or Impairment()
         self.bytes_to_callers = 0
         """Of all packets that have arrived at callers so far."""
+        self.recent: deque[bytes] = deque(maxlen=_KEPT)
+        """The last packets that have arrived at callers."""
         self._to = ("127.0.0.1", to_port)
         self._towards_listener = Line[_Sent](Direction(self.impairment, seed))
         self._towards_callers = Line[_Sent](Direction(self.impairment, seed + 1))
@@ -141,6 +160,7 @@ class UdpLink:
                 sender.sendto(packet, self._to)
             for sender, packet, caller in self._towards_callers.arrived(now_s):
                 self.bytes_to_callers += len(packet)
+                self.recent.append(packet)
                 sender.sendto(packet, caller)
 
     def _from_caller(self) -> None:
@@ -158,7 +178,7 @@ class UdpLink:
 
 
 class Line(Generic[ItemT]):
-    """What is on its way in one direction of a link, in order.
+    """What is on its way in one direction of a link, in the order in which it arrives.
 
     Args:
         direction: what becomes of each packet.
@@ -166,7 +186,10 @@ class Line(Generic[ItemT]):
 
     def __init__(self, direction: Direction) -> None:
         self._direction = direction
-        self._waiting: deque[tuple[float, ItemT]] = deque()
+        self._waiting: list[tuple[float, int, ItemT]] = []
+        """A heap: when each arrives, and how many were sent before it."""
+        self._numbers = count()
+        self._latest_s = float("-inf")
 
     @property
     def next_s(self) -> float | None:
@@ -175,15 +198,18 @@ class Line(Generic[ItemT]):
 
     def send(self, packet: bytes, item: ItemT) -> None:
         """Takes the item that stands for a packet, unless the packet is lost."""
-        arrival_s = self._direction.arrival_s(packet, time.monotonic())
-        if arrival_s is not None and len(self._waiting) < _MAX_WAITING:
-            self._waiting.append((arrival_s, item))
+        for _ in range(1 + self._direction.is_duplicated()):
+            arrival_s = self._direction.arrival_s(packet, time.monotonic())
+            if arrival_s is not None and len(self._waiting) < _MAX_WAITING:
+                if self._direction.keeps_order:
+                    arrival_s = self._latest_s = max(self._latest_s, arrival_s)
+                heapq.heappush(self._waiting, (arrival_s, next(self._numbers), item))
 
     def arrived(self, now_s: float) -> list[ItemT]:
         """Removes and returns what has arrived."""
         found = []
         while self._waiting and self._waiting[0][0] <= now_s:
-            found.append(self._waiting.popleft()[1])
+            found.append(heapq.heappop(self._waiting)[2])
         return found
 
 

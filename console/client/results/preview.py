@@ -257,3 +257,5 @@ class PictureReport:
     packets_given_up: int = 0
     """Packets that were given up, since the viewer connected."""
     delivery: PictureDelivery = PictureDelivery.UNKNOWN
+    link_age_ms: int | None = None
+    """`picture_age_ms` without the time that pictures waited on this computer. None if unknown."""

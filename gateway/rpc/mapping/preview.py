@@ -84,6 +84,7 @@ def picture_report(request: ReportPictureRequest) -> PictureReport:
         packets_held=request.packets_held,
         packets_given_up=request.packets_given_up,
         delivery=delivery_from(request.delivery),
+        link_age_ms=request.link_age_ms if request.HasField("link_age_ms") else None,
     )
 
 

@@ -3,6 +3,7 @@
 import io
 import json
 import re
+import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -15,8 +16,10 @@ import pytest
 from typer.testing import CliRunner
 
 from common.errors import UserError
+from common.findings import Finding, Verdict
 from console.client import Credentials, GatewayClient, NotAllowed
 from gateway.cli import app
+from gateway.doctor.examination import examine
 from tests.support.free import free_tcp_port
 from tests.support.robotctl import only_line, robotctl
 from tests.support.waiting import wait_until
@@ -87,6 +90,38 @@ def guess(ground: Path, target: str, login: str) -> None:
         for _ in range(7):
             with pytest.raises(NotAllowed):
                 client.status()
+
+
+def follow(advice: str) -> str:
+    """Types the command that an output names, as it stands but for what is in capitals; it must work."""
+    command = re.search(r"robot-gateway (credentials .+?)(?:;|$)", advice, re.MULTILINE)
+    assert command, advice
+    words = command[1].replace("NAME", "carl").replace("viewer|operator|admin", "viewer")
+    done = CliRunner().invoke(app, shlex.split(words))
+    assert not done.exception, f"{words}: {done.exception}"
+    return done.output
+
+
+def access_of(ground: Path) -> Finding:
+    """What `robot-gateway doctor` finds of the credentials."""
+    return {each.check: each for each in examine(ground / "gateway.yaml")}["access"]
+
+
+def test_commands_that_are_proposed_work_as_they_stand(ground: Path) -> None:
+    """Also where the directory was typed, and has a space in its name."""
+    directory = ground / "my credentials"
+    for option in (f"--directory={directory}", f"--config={ground / 'gateway.yaml'}"):
+        made = CliRunner().invoke(app, ["credentials", "init", option])
+        assert "carl, viewer" in follow(made.output)
+        unknown = CliRunner().invoke(app, ["credentials", "revoke", "nobody", option]).exception
+        assert isinstance(unknown, UserError)
+        assert "carl" in follow(unknown.remedy)
+        again = CliRunner().invoke(app, ["credentials", "init", option]).exception
+        assert isinstance(again, UserError)
+        assert "carl" in follow(again.remedy)
+    (ground / "credentials/server-key.pem").write_bytes((directory / "server-key.pem").read_bytes())
+    follow(access_of(ground).remedy)
+    assert access_of(ground).verdict is Verdict.GOOD, "the advice has helped"
 
 
 def test_from_nothing_to_a_robot_that_is_switched_and_a_credential_that_is_over(ground: Path) -> None:
@@ -160,6 +195,26 @@ def test_a_login_is_stored_over_another_only_on_request(ground: Path) -> None:
     assert again.returncode == 2
     assert f"robotctl login lab lab.local:1 {login} --offline --replace" in only_line(again.stderr)
     assert operator(ground, *words, "--replace").returncode == 0
+
+
+def test_a_login_in_a_pipe_over_another_one_is_not_lost_unnoticed(ground: Path) -> None:
+    credentials(ground, "init", "--host", "lab.local")
+    words = ("login", "lab", f"127.0.0.1:{port_of(ground)}")
+    with running(ground):
+        for number in (1, 2):
+            issued = credentials(ground, "add", "anna", "--role", "viewer")
+            with mock.patch.object(sys, "stdin", io.StringIO(issued)):
+                done = operator(ground, *words)
+            assert done.returncode == (0 if number == 1 else 2)
+        said = only_line(done.stderr)
+        assert "not stored, but stays valid" in said
+        assert "repeat the whole pipe, with --replace" in said
+        revoke = re.search(r"robot-gateway credentials (revoke [0-9a-f]{12});", said)
+        assert revoke, said
+        credentials(ground, *revoke[1].split())
+        states = {each["id"]: each["state"] for each in json.loads(credentials(ground, "list", "--json"))}
+        assert sorted(states.values()) == ["revoked", "valid"], "of the same name, the one in the pipe alone"
+        assert operator(ground, "status").returncode == 0
 
 
 def test_the_command_after_a_new_ca_is_complete(ground: Path) -> None:

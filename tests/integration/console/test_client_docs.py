@@ -4,11 +4,14 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 import pytest
 
-from console.client import ClientOptions, GatewayClient, GatewayError, errors
+from console.client import ClientOptions, Event, GatewayClient, GatewayError, errors
+from console.client.results import EventKind
 from tests.support.documented_code import DOCS, Example, examples
 from tests.support.gateway_program import gateway_program
 from tests.support.preview_double import double_process
@@ -88,6 +91,22 @@ def test_every_error_is_in_the_table_with_its_word() -> None:
     }
     rows = dict(re.findall(r"^\| `(\w+)`(?:, a `Refused`)? \| `(\w+)` \|", PAGE, re.MULTILINE))
     assert rows == family
+
+
+def test_the_table_of_events_has_every_kind_and_field() -> None:
+    table = PAGE.partition("| `kind` | field | has |")[2].partition("\n\n")[0]
+    rows = [
+        [re.findall(r"`([\w.]+)`", cell) for cell in line.split("|")[1:4]] for line in table.splitlines()[2:]
+    ]
+    kinds = [kind.removeprefix("EventKind.") for row in rows for kind in row[0]]
+    assert sorted(kinds) == sorted(kind.name for kind in EventKind)
+    hints = get_type_hints(Event)
+    parts = {field.name: get_args(hints[field.name])[0] for field in fields(Event) if field.default is None}
+    rows = [row for row in rows if row[1]]
+    assert sorted(name for row in rows for name in row[1]) == sorted(parts)
+    for _, (name, *_more), has in rows:
+        if is_dataclass(parts[name]):
+            assert has == [field.name for field in fields(parts[name])], name
 
 
 def test_every_option_and_method_is_named() -> None:

@@ -138,7 +138,7 @@ def test_events_and_gaps_of_all_robots_or_one(hub: FleetHub) -> None:
         batch("lab1", event(1), gap, event(9)), batch("lab2", event(1, severity=FAULT_SEVERITY_ERROR))
     )
     lines = shown(hub, "events")
-    assert [line[21:] for line in (lines[0], lines[2], lines[3])] == [
+    assert [line[26:] for line in (lines[0], lines[2], lines[3])] == [
         "lab1          info     lidar       event 1",
         "lab1          info     lidar       event 9",
         "lab2          error    lidar       event 1",
@@ -148,7 +148,7 @@ def test_events_and_gaps_of_all_robots_or_one(hub: FleetHub) -> None:
         "of an earlier run, too, an unknown number"
     )
     assert len(shown(hub, "events", "lab2")) == 1
-    assert [line.split()[2] for line in shown(hub, "events", "--severity", "error")] == ["lab2"]
+    assert [line.split()[3] for line in shown(hub, "events", "--severity", "error")] == ["lab2"]
     # A gap that may hide a warning stays.
     assert len(shown(hub, "events", "--severity", "warning")) == 2
     assert shown(hub, "events", "--since", "2100-01-01") == []

@@ -116,6 +116,19 @@ async def test_the_worst_age_is_shown_and_passed_on(tmp_path: Path) -> None:
         await eventually(passed_on, lambda ages: ages[-1:] == [120], "the age less its error")
 
 
+async def test_a_slow_computer_of_a_viewer_costs_the_others_no_bit_rate(tmp_path: Path) -> None:
+    double = PreviewDouble()
+    async with robot(tmp_path / "preview.sock", double) as operator:
+        await turned_on(operator, double)
+        await report(operator, picture_age_ms=900, link_age_ms=30)
+
+        async def passed_on() -> list[int]:
+            return double.picture_ages_ms
+
+        assert await eventually(passed_on, bool, "an age") == [30]
+        assert (await operator.status()).preview.measured.worst_picture_age_ms == 900
+
+
 async def test_without_a_viewer_on_the_stream_no_report_counts(tmp_path: Path) -> None:
     double = PreviewDouble()
     async with robot(tmp_path / "preview.sock", double) as operator:
@@ -142,6 +155,7 @@ async def test_without_a_viewer_on_the_stream_no_report_counts(tmp_path: Path) -
         {"picture_age_ms": 60_001},
         {"picture_age_error_ms": 60_001},
         {"rtt_ms": 60_001},
+        {"link_age_ms": 60_001},
         {"loss_percent": -1.0},
         {"loss_percent": 100.5},
         {"loss_percent": float("nan")},

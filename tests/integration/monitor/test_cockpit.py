@@ -33,6 +33,7 @@ from tests.support.cockpit import (
     with_teleop,
     with_trouble,
 )
+from tests.support.found_robots import FoundRobots
 from tests.support.qt import keep_screenshot, let_pass, press, until
 
 pytestmark = pytest.mark.gst
@@ -91,7 +92,7 @@ class Cockpit:
 
 @contextmanager
 def in_front_of(robot: CockpitRobot) -> Iterator[Cockpit]:
-    roster = Roster(lambda: RobotsFile(Path("x"), {"lab2": Robot(target=OTHER.target)}), lambda: [FOUND])
+    roster = Roster(lambda: RobotsFile(Path("x"), {"lab2": Robot(target=OTHER.target)}), FoundRobots([FOUND]))
     with monitor(robot.target, roster=roster) as window:
         made = Cockpit(window, robot)
         made.sized(*WINDOW)
@@ -202,6 +203,25 @@ def test_nothing_jumps(cockpit: Cockpit) -> None:
     assert cockpit.where() == before
     cockpit.robot.gateway.hold.set()
     until(window.banner.isHidden, "back again")
+
+
+def test_nothing_looks_alive_while_the_robot_does_not_answer(cockpit: Cockpit) -> None:
+    window, robot = cockpit.window, cockpit.robot.gateway
+    with_teleop(robot)
+    robot.status.preview.last_error = "the camera was busy"
+    place = window.strip.driving
+    until(lambda: place.state.text() == "Driving enabled" and place.drive.isEnabled(), "driving")
+    until(
+        lambda: [note.marker.severity for note in window.side.notes.shown] == [SeverityStyle.WARNING], "note"
+    )
+    robot.hold.clear()
+    until(lambda: place.state.text() == "Driving enabled, last known", "what was last known")
+    assert not place.drive.isEnabled()
+    assert place.stop_place.isEnabled(), "STOP works whatever is known"
+    assert window.header.mode.detail.text() == "last known"
+    assert [note.marker.severity for note in window.side.notes.shown] == [SeverityStyle.QUIET]
+    robot.hold.set()
+    until(lambda: place.state.text() == "Driving enabled" and place.drive.isEnabled(), "it answers again")
 
 
 def test_a_message_is_closed_with_esc(cockpit: Cockpit) -> None:

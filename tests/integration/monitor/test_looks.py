@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QRectF
 from PySide6.QtGui import QColor, QImage, QPainter, QPalette
-from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel, QPushButton, QWidget
 
 from console.presentation.severity_style import SeverityStyle
 from console.window.cell import SmallLabel
@@ -23,6 +23,8 @@ from tests.support.snapshots import event
 
 READABLE = 4.5
 """Contrast that the Web Content Accessibility Guidelines ask of text (level AA)."""
+DISABLED_READABLE = 3.0
+"""They ask nothing of what is disabled; this much of signs that are not text."""
 SMALL_SCREEN = (1024, 600)
 SETTINGS = "robot-gateway/monitor.ini"
 
@@ -80,6 +82,23 @@ def test_every_text_is_readable(window: MonitorWindow, name: str, ground: QColor
     for label in labels:
         ratio = contrast(label.palette().color(label.foregroundRole()), ground_of(label))
         assert ratio >= READABLE, f"'{label.text()}' on {ground_of(label).name()}: {ratio:.1f}"
+
+
+@pytest.mark.parametrize("ground", [LIGHT, DARK], ids=["light", "dark"])
+def test_a_button_that_is_disabled_can_still_be_read(window: MonitorWindow, ground: QColor) -> None:
+    in_colours(ground)
+    let_pass(0.3)
+    active, disabled = QPalette.ColorGroup.Active, QPalette.ColorGroup.Disabled
+    text, ground_role = QPalette.ColorRole.ButtonText, QPalette.ColorRole.Button
+    # STOP has colours of its own, and is never disabled.
+    buttons = [each for each in window.findChildren(QAbstractButton) if each.text() not in ("", "STOP")]
+    assert len(buttons) > 15
+    for button in buttons:
+        palette = button.palette()
+        ratio = contrast(palette.color(disabled, text), palette.color(disabled, ground_role))
+        assert ratio >= DISABLED_READABLE, f"'{button.text()}': {ratio:.1f}"
+        enabled = contrast(palette.color(active, text), palette.color(active, ground_role))
+        assert ratio < enabled, f"'{button.text()}' looks as if it could be pressed"
 
 
 def test_the_banner_of_a_lost_connection_is_readable() -> None:

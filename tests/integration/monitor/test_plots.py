@@ -6,7 +6,7 @@ from PySide6.QtGui import QFont, QFontMetricsF
 from console.monitor.history import METRICS, Metric
 from console.window.plot import Plot
 
-BIT_RATE = METRICS[1]
+BIT_RATE = METRICS[2]
 
 
 @pytest.mark.parametrize("metric", METRICS, ids=lambda metric: metric.title)

@@ -2,6 +2,7 @@
 
 import asyncio
 import socket
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
@@ -57,6 +58,28 @@ async def test_the_age_that_viewers_report_reaches_the_adaptive_bit_rate(
     await eventually(windows, lambda ages: ages[-1] == 140, "the age")
     assert seen[0] is None
     await viewer
+    assert await (await runner.stop())
+
+
+async def test_an_age_that_the_camera_causes_is_not_of_the_link() -> None:
+    """A camera that delivers nothing for half a second, as a real pipeline shows it."""
+    events = Events()
+    runner = Runner(plan_of(LIVE), events)
+    await runner.start()
+    await events.wait_for("first_frame")
+    age = runner._picture_age
+    runner.take_picture_age(140)
+    assert age.counting(time.monotonic()) == 140
+    pad = runner._parts.source.get_static_pad("src")
+    stalled = pad.add_probe(Gst.PadProbeType.BLOCK_DOWNSTREAM, lambda *_: Gst.PadProbeReturn.OK)
+
+    async def counts() -> int | None:
+        return age.counting(time.monotonic())
+
+    await eventually(counts, lambda found: found is None, "the camera stands still", 2.0)
+    pad.remove_probe(stalled)
+    runner.take_picture_age(600)
+    assert age.counting(time.monotonic()) is None
     assert await (await runner.stop())
 
 

@@ -1,9 +1,12 @@
 """Direct delivery with the real libsrt: GStreamer's srtsink sends, a relay delays and loses."""
 
+import errno
 import random
 import socket
+import struct
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from itertools import pairwise
 from typing import Any
@@ -12,25 +15,33 @@ import pytest
 
 from common.errors import UserError
 from common.gst import Gst, stop
-from console.capture_time import CaptureClock
-from console.receiver import reception
+from console.capture_time import WRAP_TICKS, CaptureClock, ticks_to_ns
+from console.receiver import libsrt, reception
 from console.receiver.address import StreamAddress
+from console.receiver.connection import connect
 from console.receiver.delivery import DeliveryChoice
+from console.receiver.direct import DirectConnection
 from console.receiver.errors import StreamEndedError, StreamRefusedError
 from console.receiver.frame import Frame
+from console.receiver.frame_queue import FrameQueue
 from console.receiver.libsrt import LibsrtMissingError
-from console.receiver.options import ReceiverOptions
+from console.receiver.options import CLOSES_WITHIN_S, ReceiverOptions
 from console.receiver.reorder import Delivered, Reorder
 from tests.support.free import free_udp_port
 from tests.support.receiver import NoFrameError, Receiver
 from tests.support.streams import SrtSender, encode
 from tests.support.udp_link import Impairment, UdpLink
+from tests.support.waiting import wait_until
 
 pytestmark = pytest.mark.gst
 
 PATIENCE_S = 20
 FRAMES = 90
 FRAME_S = 1 / 30
+CLOSING = 7
+"""SRTS_CLOSING: that state and those after it."""
+SLOW_FRAME_S = 0.1
+KEY_FRAME_EVERY = 15
 CLOSED_WITHIN_S = 1.0
 AFTERWARDS = 15
 NO_FRAME = bytes([0x47, 0x1F, 0xFF, 0x10]) + bytes(184)
@@ -104,8 +115,10 @@ def assert_every_frame(frames: list[Frame]) -> None:
         Impairment(),
         Impairment(delay_s=0.01, loss=0.03, control_loss=0.03),
         Impairment(delay_s=0.01, loss=0.1, control_loss=0.1),
+        Impairment(delay_s=0.01, jitter_s=0.01, duplicates=0.05),
+        Impairment(delay_s=0.01, jitter_s=0.01, duplicates=0.05, loss=0.03, control_loss=0.03),
     ],
-    ids=["loopback", "20 ms, 3 %", "20 ms, 10 %"],
+    ids=["loopback", "20 ms, 3 %", "20 ms, 10 %", "out of order, some twice", "that, and 3 %"],
 )
 def test_every_frame_is_delivered(
     port: int, pieces: list[bytes], impairment: Impairment, monkeypatch: pytest.MonkeyPatch
@@ -116,7 +129,8 @@ def test_every_frame_is_delivered(
     assert_every_frame(frames)
     assert delivery.kind is DeliveryChoice.DIRECT
     assert (delivery.given_up, delivery.dropped_frames, delivery.rejoins) == (0, 0, 0)
-    assert (delivery.lost > 0) == (impairment.loss > 0)
+    # What is overtaken is missing at first, too.
+    assert (delivery.lost > 0) == (impairment.loss > 0 or impairment.jitter_s > 0)
 
 
 def test_it_is_the_order_that_delivers_them(
@@ -147,6 +161,46 @@ def test_no_torn_frame_is_shown_where_packets_are_given_up(
     assert any(lost)
     assert 0 < len(frames) < FRAMES
     assert not any(frame.corrupt for frame in frames)
+
+
+class SlowQueue(FrameQueue):
+    """Takes as long for each frame as a slow decoder."""
+
+    def __init__(self) -> None:
+        super().__init__(FRAMES)
+        self.frames: list[Frame] = []
+
+    def put(self, frame: Frame) -> None:
+        time.sleep(SLOW_FRAME_S)
+        self.frames.append(frame)
+
+
+def test_a_decoder_that_is_too_slow_shows_newer_frames_and_bothers_nobody(port: int) -> None:
+    """At 10 of 30 frames per second; a key frame comes every 15."""
+    pieces = encode("h264", 3 * FRAMES, kbps=500, gop=KEY_FRAME_EVERY)
+    lost: list[int | None] = []
+
+    def request(newest_pts: int | None) -> bool:
+        lost.append(newest_pts)
+        return True
+
+    slow = SlowQueue()
+    with SrtSender(port) as sender:
+        options = ReceiverOptions(max_age_s=1000, on_picture_lost=request)
+        connection = DirectConnection(StreamAddress("127.0.0.1", port, latency_ms=125), slow, options)
+        try:
+            assert sender.viewer_joined.wait(PATIENCE_S)
+            play(sender, pieces)
+        finally:
+            connection.close()
+    waits_s = [frame.arrival_s - frame.received_s for frame in slow.frames if frame.received_s]
+    print(f"{len(waits_s)} frames, the longest wait {max(waits_s):.2f} s")
+    # 0.6 s at most, or up to the next key frame; and the frames that the decoder has at hand.
+    assert max(waits_s) < 0.6 + KEY_FRAME_EVERY * FRAME_S + 5 * SLOW_FRAME_S
+    assert connection.delivery.dropped_frames > FRAMES
+    assert connection.delivery.rejoins == 0
+    assert lost == []
+    assert not any(frame.corrupt for frame in slow.frames)
 
 
 def test_ten_viewers(port: int, pieces: list[bytes]) -> None:
@@ -190,6 +244,67 @@ def test_it_stops_while_a_listener_does_not_answer() -> None:
             viewer.next_frame(0.3)
 
 
+@pytest.fixture
+def stuck() -> Iterator[threading.Event]:
+    """What hangs waits for it; at the end everything goes on, so that no thread is left."""
+    released = threading.Event()
+    yield released
+    released.set()
+    wait_until(
+        lambda: (
+            not {"receiver", "receiver-close", "resolver"} & {each.name for each in threading.enumerate()}
+        ),
+        "the threads end",
+    )
+
+
+@pytest.mark.parametrize("delivery", [DeliveryChoice.DIRECT, DeliveryChoice.SRT])
+def test_a_resolver_that_hangs_keeps_nobody_waiting(
+    stuck: threading.Event, monkeypatch: pytest.MonkeyPatch, delivery: DeliveryChoice
+) -> None:
+    monkeypatch.setattr("console.name_lookup.socket.getaddrinfo", lambda *_args, **_more: stuck.wait() and [])
+    monkeypatch.setattr("console.receiver.direct._RESOLVES_WITHIN_S", 0.2)
+    monkeypatch.setattr("console.receiver.srt._RESOLVES_WITHIN_S", 0.2)
+    address = StreamAddress("robot.invalid", 7100, latency_ms=20)
+    with (
+        Receiver(address, options=ReceiverOptions(delivery=delivery)) as viewer,
+        pytest.raises(StreamRefusedError, match=r"robot.invalid"),
+    ):
+        viewer.next_frame(PATIENCE_S)
+
+
+def test_it_stops_while_a_resolver_hangs(stuck: threading.Event, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("console.name_lookup.socket.getaddrinfo", lambda *_args, **_more: stuck.wait() and [])
+    address = StreamAddress("robot.invalid", 7100, latency_ms=20)
+    with closed_in_time(Receiver(address)) as viewer, pytest.raises(NoFrameError):
+        viewer.next_frame(0.3)
+
+
+@pytest.mark.parametrize("delivery", [DeliveryChoice.DIRECT, DeliveryChoice.SRT])
+def test_a_driver_that_hangs_when_it_is_stopped_is_left_behind(
+    port: int,
+    pieces: list[bytes],
+    stuck: threading.Event,
+    monkeypatch: pytest.MonkeyPatch,
+    delivery: DeliveryChoice,
+) -> None:
+    def hang(pipeline: Any) -> None:
+        assert stuck.wait(PATIENCE_S)
+        stop(pipeline)
+
+    monkeypatch.setattr("console.receiver.unit_decoder.stop", hang)
+    monkeypatch.setattr("console.receiver.srt.stop", hang)
+    queue = FrameQueue(FRAMES)
+    with SrtSender(port) as sender:
+        address = StreamAddress("127.0.0.1", port, latency_ms=20)
+        connection = connect(address, queue, ReceiverOptions(delivery=delivery, max_age_s=1000))
+        assert sender.viewer_joined.wait(PATIENCE_S)
+        sender.send(pieces[0])
+        begun_s = time.monotonic()
+        assert not connection.close()
+        assert time.monotonic() - begun_s < 2 * CLOSES_WITHIN_S
+
+
 def test_a_listener_that_does_not_answer_is_reported() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent:
         silent.bind(("127.0.0.1", 0))
@@ -216,6 +331,92 @@ def test_hostile_datagrams_do_no_harm(port: int, pieces: list[bytes]) -> None:
                 link.inject(noise.randbytes(noise.choice([0, 1, 15, 16, 17, 60, 1316, 1472])))
             sender.send(piece)
             assert not viewer.next_frame(PATIENCE_S).corrupt
+
+
+def flipped(packet: bytes, noise: random.Random) -> bytes:
+    changed = bytearray(packet)
+    for _ in range(noise.randint(1, 4)):
+        changed[noise.randrange(len(changed))] ^= 1 << noise.randrange(8)
+    # The socket's ID: otherwise libsrt drops it before any connection sees it.
+    changed[12:16] = packet[12:16]
+    return bytes(changed)
+
+
+def truncated(packet: bytes, noise: random.Random) -> bytes:
+    return packet[: noise.randrange(16, len(packet))]
+
+
+def renumbered(packet: bytes, noise: random.Random) -> bytes:
+    """With the number of a packet that was not sent yet, or long ago."""
+    return noise.randrange(1 << 31).to_bytes(4) + packet[4:]
+
+
+def control(kind: int) -> Callable[[bytes, random.Random], bytes]:
+    """Makes control packets with any content (draft-sharabayko-srt-01 3.2)."""
+
+    def forged(packet: bytes, noise: random.Random) -> bytes:
+        content = noise.randbytes(4 * noise.randrange(20))
+        return (0x8000 | kind).to_bytes(2) + bytes(2) + noise.randbytes(8) + packet[12:16] + content
+
+    return forged
+
+
+@pytest.mark.parametrize(
+    "forge",
+    [
+        pytest.param(lambda packet, _noise: packet, id="the same again"),
+        pytest.param(flipped, id="bits flipped"),
+        pytest.param(truncated, id="truncated"),
+        pytest.param(renumbered, id="another number"),
+        pytest.param(control(0), id="handshake"),
+        pytest.param(control(2), id="ACK"),
+        pytest.param(control(3), id="NAK"),
+        pytest.param(control(5), id="shutdown"),
+        pytest.param(control(7), id="drop request"),
+        pytest.param(control(0x7FFF), id="user-defined"),
+    ],
+)
+def test_forged_packets_of_the_connection_end_it_at_worst(
+    port: int, pieces: list[bytes], forge: Callable[[bytes, random.Random], bytes]
+) -> None:
+    """Who sees an unencrypted stream can end it; the next connection is as good as any."""
+    noise = random.Random(1)
+    with SrtSender(port) as sender, UdpLink(port) as link:
+        for attacked in (True, False):
+            sender.viewer_joined.clear()
+            link.recent.clear()
+            with closed_in_time(receiver(link.port, max_age_s=1000)) as viewer:
+                assert sender.viewer_joined.wait(PATIENCE_S)
+                frames = 0
+                for piece in pieces[:30]:
+                    sender.send(piece)
+                    try:
+                        frames += viewer.next_frame(PATIENCE_S if not attacked else 0.1).width == 320
+                    except (StreamEndedError, NoFrameError):
+                        assert attacked
+                    for packet in list(link.recent)[-10:] if attacked else []:
+                        link.inject(forge(packet, noise))
+                assert frames == 30 or attacked
+                assert frames > 0
+
+
+def test_without_a_descriptor_no_socket_of_srt_is_left(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[int] = []
+    library = libsrt.load()
+    create = library.srt_create_socket
+
+    def count() -> int:
+        made.append(create())
+        return made[-1]
+
+    def exhausted(*_args: object) -> socket.socket:
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    monkeypatch.setattr(library, "srt_create_socket", count)
+    monkeypatch.setattr("console.receiver.libsrt.socket.socket", exhausted)
+    with pytest.raises(OSError, match="Too many open files"):
+        libsrt.SrtSocket("127.0.0.1", port, 20, "")
+    assert all(library.srt_getsockstate(each) >= CLOSING for each in made)
 
 
 def _missing() -> None:
@@ -285,6 +486,39 @@ def test_every_frame_carries_its_capture_time(port: int) -> None:
         assert min(abs(frame.capture_ns - each) for each in captured_ns) < 1_000_000
         assert 0 < now_ns - frame.capture_ns < PATIENCE_S * 10**9
     assert len({frame.capture_ns for frame in frames}) == len(frames)
+
+
+def restamped(piece: bytes, by_ticks: int) -> bytes:
+    """The same with all PTS moved, over their wrap where it comes (ISO/IEC 13818-1 2.4.3.7)."""
+    changed = bytearray(piece)
+    for start in range(0, len(piece), 188):
+        pes = start + 4 + (1 + piece[start + 4] if piece[start + 3] & 0x20 else 0)
+        if piece[start + 1] & 0x40 and piece[pes : pes + 4] == b"\0\0\1\xe0":
+            at = pes + 9
+            upper, middle, lower = piece[at], *struct.unpack(">HH", piece[at + 1 : at + 5])
+            ticks = (upper >> 1 & 7) << 30 | middle >> 1 << 15 | lower >> 1
+            ticks = (ticks + by_ticks) % WRAP_TICKS
+            changed[at] = upper & 0xF1 | ticks >> 30 << 1
+            struct.pack_into(
+                ">HH", changed, at + 1, (ticks >> 15 & 0x7FFF) << 1 | 1, (ticks & 0x7FFF) << 1 | 1
+            )
+    return bytes(changed)
+
+
+def test_a_stream_whose_pts_wraps_goes_on_with_true_capture_times(port: int, pieces: list[bytes]) -> None:
+    """In the middle of it, with the age bounded as usual: no frame is lost, or taken for an old one."""
+    hour_ticks, middle_ticks = 3600 * 90_000, FRAMES // 2 * 3000
+    wrapping = [restamped(piece, -hour_ticks - middle_ticks) for piece in pieces]
+    captured_ns = ticks_to_ns(WRAP_TICKS - middle_ticks)
+    begun_ns = time.monotonic_ns()
+    capture = CaptureClock(0, lambda: captured_ns + time.monotonic_ns() - begun_ns)
+    delivery, frames = watched(port, wrapping, Impairment(), capture=capture, max_age_s=PATIENCE_S)
+    assert_every_frame(frames)
+    assert (delivery.rejoins, delivery.dropped_frames) == (0, 0)
+    times_ns = [frame.capture_ns or 0 for frame in frames]
+    expected_ns = [captured_ns + round(number * 1e9 / 30) for number in range(FRAMES)]
+    assert times_ns == pytest.approx(expected_ns, rel=0, abs=20_000), "to a tick of 90 kHz, rounded twice"
+    assert times_ns[0] < WRAP_TICKS * 100_000 // 9 < times_ns[-1]
 
 
 def test_a_narrow_link_does_not_make_frames_old(port: int) -> None:

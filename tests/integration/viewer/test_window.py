@@ -2,13 +2,14 @@
 
 import statistics
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from bench.viewer import extra_latency_ms, on_screen
+from console.client import GatewayClient
 from console.receiver.recording import Recording
 from console.viewer.geometry import Box
 from console.viewer.playback import PlaybackState
@@ -37,6 +38,8 @@ __all__ = ["application"]
 FPS = 30
 FREEZE_SHOWN_WITHIN_S = 0.7
 BACK_WITHIN_S = 1.5
+HIDDEN_MS = 2000
+"""A window is hidden for longer than this: until its last report has ceased to count."""
 WATCH_S = 1.0
 """30 frames of each side in each round."""
 BOX_YELLOW = QColor("#F0E442")
@@ -144,6 +147,30 @@ def test_a_window_that_was_busy_paints_the_latest_frame_only(ground: VideoGround
     view.video.painted.connect(lambda: painted.append(time.monotonic()))
     let_pass(0.2)
     assert 1 <= len(painted) < 15
+
+
+@pytest.mark.parametrize("hidden_by", [QWidget.showMinimized, QWidget.hide], ids=["minimised", "hidden"])
+def test_a_window_that_nobody_can_see_reports_no_age(
+    ground: VideoGround, view: ViewWindow, hidden_by: Callable[[QWidget], None]
+) -> None:
+    """Its age would only grow, and lower the bit rate of all viewers."""
+    ground.switch_on()
+    with GatewayClient(ground.target) as client:
+
+        def reporting() -> int | None:
+            return client.status().preview.measured.reporting_viewer_count
+
+        until(reporting, "a report")
+        hidden_by(view)
+        until(lambda: not reporting(), "no report counts any more")
+        assert view.robot.session.playback().state is PlaybackState.LIVE
+        assert view.robot.meter.capture_ns() is None, "nobody drives by it"
+        assert view.robot.meter.summary(), "pictures that were seen"
+        view.showNormal()
+        until(reporting, "a report of the picture that is shown again")
+        worst_ms = client.status().preview.measured.worst_picture_age_ms
+        assert worst_ms is not None
+        assert worst_ms < HIDDEN_MS
 
 
 def test_a_refusal_is_shown_in_the_robots_words() -> None:

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from console.capture_time import (
     WRAP_TICKS,
     CaptureClock,
+    Unwrapped,
     capture_ns,
     nearest,
     ns_to_ticks,
@@ -47,6 +48,29 @@ def test_frames_around_the_wrap_are_33_ms_apart() -> None:
     ]
     steps = [later - earlier for earlier, later in pairwise(times_ns)]
     assert all(abs(step - 33_333_333) <= 1 for step in steps)
+
+
+@given(
+    st.integers(0, WRAP_TICKS - 1),
+    st.lists(st.integers(-(WRAP_TICKS // 2) + 1, WRAP_TICKS // 2 - 1), max_size=50),
+)
+def test_the_steps_of_a_stream_survive_its_wraps(first: int, steps: list[int]) -> None:
+    """Forwards, backwards and over any number of wraps, by up to half of one at a time."""
+    unwrapped, sent = Unwrapped(), first
+    before = unwrapped.ticks(sent)
+    assert before > 0
+    for step in steps:
+        sent = (sent + step) % WRAP_TICKS
+        now = unwrapped.ticks(sent)
+        assert now - before == step
+        assert now % WRAP_TICKS == sent
+        before = now
+
+
+def test_a_day_and_more_of_frames_goes_on_over_the_wraps() -> None:
+    unwrapped = Unwrapped()
+    hours = [unwrapped.ticks(hour * 3600 * 90_000 % WRAP_TICKS) for hour in range(100)]
+    assert {later - earlier for earlier, later in pairwise(hours)} == {3600 * 90_000}
 
 
 @given(st.integers(0, WRAP_TICKS - 1), st.integers(-(10**15), 10**15))

@@ -7,6 +7,7 @@ import pytest
 
 from console.client import Unreachable
 from console.monitor.bar_items import (
+    BarItem,
     battery_item,
     clock_item,
     health_item,
@@ -16,6 +17,7 @@ from console.monitor.bar_items import (
 )
 from console.monitor.link import Link, LinkState, link_text
 from console.monitor.monitor_state import MonitorState
+from console.presentation.own_stream import OwnStream
 from console.presentation.picture_age import PictureAge, reported_age
 from console.presentation.severity_style import SeverityStyle
 from omniseer.gateway.v1 import overlay_pb2
@@ -37,6 +39,15 @@ def test_the_health_begins_with_the_counts() -> None:
     item = health_item(heard(snapshot(troubled)), NOW_S)
     assert (item.word, item.style) == ("DEGRADED", SeverityStyle.WARNING)
     assert item.detail == "2 errors, 1 warning, odometry stopped coming"
+
+
+def test_no_tick_stands_beside_an_error_that_the_health_ignores() -> None:
+    def change(made: overlay_pb2.OverlaySnapshot) -> None:
+        made.status.faults.add(id="preview.faulted", severity=3, active=True)
+
+    item = health_item(heard(snapshot(change)), NOW_S)
+    assert (item.word, item.style) == ("OK", SeverityStyle.WARNING)
+    assert item.detail.startswith("1 error")
 
 
 def test_a_silent_robots_health_is_not_known() -> None:
@@ -84,6 +95,29 @@ def test_the_link_has_round_trip_loss_and_wifi() -> None:
     assert item.style is SeverityStyle.WARNING
 
 
+def test_the_loss_is_that_of_this_windows_stream_where_it_is_known() -> None:
+    def change(made: overlay_pb2.OverlaySnapshot) -> None:
+        made.status.preview.measured.available, made.status.preview.measured.worst_loss_percent = True, 9.0
+
+    state = heard(snapshot(change))
+    link = link_text(state.link, "lab", NOW_S)
+    known = link_item(state, link, NOW_S, OwnStream("direct", loss_percent=0.4))
+    assert "loss 0.4 %" in known.detail
+    assert "packet loss of the video here" in known.tip
+    unknown = link_item(state, link, NOW_S, OwnStream("SRT latency"))
+    assert "loss 9.0 %" in unknown.detail
+    assert "of all viewers" in unknown.tip
+
+
+def test_the_tip_of_the_picture_has_cause_and_delivery() -> None:
+    stream = OwnStream("direct, round trip 20 ms, rejoined 2x")
+    assert picture_item(PictureAge(180, cause="longest part: link"), None, stream).tip == (
+        "longest part: link, direct, round trip 20 ms, rejoined 2x"
+    )
+    assert picture_item(None, None, stream).tip.startswith("the age is not known, direct")
+    assert picture_item(None, 2.0, stream).tip == stream.text
+
+
 def test_a_lost_link_says_what_is_the_matter() -> None:
     link = Link(state=LinkState.LOST, since_s=NOW_S - 5, error=Unreachable("gone"), attempts=1)
     item = link_item(replace(heard(), link=link), link_text(link, "lab", NOW_S), NOW_S)
@@ -124,8 +158,16 @@ def test_the_mode_stays_valid() -> None:
         made.status.mission.available, made.status.mission.stale = True, True
         made.status.mission.mode = "manual"
 
-    assert mode_item(heard(snapshot(change))).word == "manual"
-    assert mode_item(EMPTY).word == "-"
+    assert mode_item(heard(snapshot(change)), NOW_S) == BarItem("manual", "mode")
+    assert mode_item(EMPTY, NOW_S).word == "-"
+
+
+def test_the_mode_of_a_silent_robot_is_the_last_known_one() -> None:
+    def change(made: overlay_pb2.OverlaySnapshot) -> None:
+        made.status.mission.available, made.status.mission.mode = True, "manual"
+
+    item = mode_item(heard(snapshot(change)), NOW_S + 60)
+    assert (item.word, item.detail, item.style) == ("manual", "last known", SeverityStyle.QUIET)
 
 
 @pytest.mark.parametrize(

@@ -80,4 +80,9 @@ def test_only_fresh_values_are_plotted() -> None:
         compute.cpu_temperature_available, compute.cpu_temperature_c = True, 51
         measured.available, measured.stale, measured.fps = True, True, 30
 
-    assert values_of(snapshot(change).status) == (None, None, None, 34, 51)
+    assert values_of(83.0, snapshot(change).status) == (83.0, None, None, None, 34, 51)
+
+
+def test_the_age_of_the_picture_needs_no_status() -> None:
+    """The video goes on without the gateway."""
+    assert values_of(83.0, None) == (83.0, *NOTHING[1:])

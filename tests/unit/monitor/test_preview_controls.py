@@ -185,3 +185,44 @@ def test_the_next_camera_is_the_next_that_works(
     states_: dict[str, CameraState], present: str, following: str
 ) -> None:
     assert next_camera(with_cameras(True, present, **states_).status.preview.cameras, present) == following
+
+
+def test_what_an_active_fault_says_is_no_note_beside_it() -> None:
+    def change(made: overlay_pb2.OverlaySnapshot) -> None:
+        preview = made.status.preview
+        preview.state, preview.last_error = states.PREVIEW_FAULTED, "camera unplugged"
+        preview.encoder.wanted, preview.encoder.fallback_reason = "mpp-h265", "no driver"
+        preview.bitrate_reason = "RTT 90 ms: 2.00 Mbit/s -> 1.00 Mbit/s"
+        preview.service_reachable = True
+        made.status.faults.add(id="preview.faulted", severity=3, active=True)
+        made.status.faults.add(id="preview.fallback", severity=2, active=False)
+
+    now = of(snapshot(change))
+    assert [note.text for note in now.conditions] == [
+        "camera unplugged",
+        "Preferred mpp-h265: no driver",
+        "Bit rate: RTT 90 ms: 2.00 Mbit/s -> 1.00 Mbit/s",
+    ]
+    assert now.beside_faults == now.conditions[1:], "a cleared fault does not say it"
+
+
+def test_a_camera_that_has_a_fault_needs_no_note() -> None:
+    def change(made: overlay_pb2.OverlaySnapshot) -> None:
+        preview = made.status.preview
+        preview.state, preview.service_reachable, preview.wanted_camera = (
+            states.PREVIEW_RUNNING,
+            True,
+            "front",
+        )
+        preview.cameras.add(name="front", state=preview_pb2.CAMERA_STATE_FAILED, error="unplugged")
+        made.status.faults.add(id="preview.camera.front", severity=2, active=True)
+
+    now = of(snapshot(change))
+    assert len(now.conditions) == 1
+    assert now.beside_faults == ()
+
+
+def test_warnings_of_a_silent_robot_are_not_coloured() -> None:
+    warned = with_preview(states.PREVIEW_FAULTED, "camera unplugged")
+    (note,) = controls(heard(warned), None, NOW_S + 60).beside_faults
+    assert note == Note("camera unplugged", SeverityStyle.QUIET)

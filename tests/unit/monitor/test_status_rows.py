@@ -8,7 +8,8 @@ from console.client import Unreachable
 from console.monitor.alarm import Alarm
 from console.monitor.link import Link, LinkState
 from console.monitor.monitor_state import MonitorState
-from console.monitor.status_rows import component_rows, fault_items, fault_rows
+from console.monitor.status_rows import component_rows, fault_items, fault_rows, stream_rows
+from console.presentation.own_stream import OwnStream
 from console.presentation.severity_style import SeverityStyle
 from console.presentation.status_table import Row
 from omniseer.gateway.v1 import fault_pb2, overlay_pb2
@@ -127,3 +128,12 @@ def test_a_message_that_begins_with_its_component_is_not_doubled() -> None:
         made.status.faults.add(id="x", component="odometry", message="Odometry stopped coming", active=True)
 
     assert fault_rows(heard(snapshot(change)), NOW_S)[0].text == "Odometry stopped coming"
+
+
+def test_the_stream_of_this_window_has_a_row_that_warns_of_a_fallback() -> None:
+    assert stream_rows(None) == []
+    (direct,) = stream_rows(OwnStream("direct, round trip 20 ms, rejoined 2x"))
+    assert (direct.style, direct.text) == (SeverityStyle.GOOD, "direct, round trip 20 ms, rejoined 2x")
+    (late,) = stream_rows(OwnStream("SRT latency (libsrt is not installed)", is_fallback=True))
+    assert (late.mark, late.style) == ("LATE", SeverityStyle.WARNING)
+    assert late.text == "SRT latency (libsrt is not installed)"

@@ -90,6 +90,8 @@ class PlayedRobot(NotDriven, PlayedRecordings):
         self.another_login = False
         self.clock = Clock()
         self.key_frames: list[int | None] = []
+        self.key_frames_hang = False
+        self.key_frame_error: Exception | None = None
         self.pictures: list[PictureReport] = []
         self.old = False
 
@@ -140,8 +142,12 @@ class PlayedRobot(NotDriven, PlayedRecordings):
 
     async def request_key_frame(self, newest_pts: int | None = None) -> KeyFrameAnswer:
         self.key_frames.append(newest_pts)
+        if self.key_frames_hang:
+            await asyncio.Event().wait()
         if self.old:
             raise Unsupported("an older robot")
+        if self.key_frame_error:
+            raise self.key_frame_error
         return KeyFrameAnswer(forced=True)
 
     async def report_picture(self, report: PictureReport) -> None:
@@ -479,17 +485,49 @@ def test_a_key_frame_is_requested_while_the_robot_answers() -> None:
     assert not worker.request_key_frame(9)
 
 
-def test_requests_are_spaced_and_the_newest_of_those_in_between_is_sent() -> None:
+def test_three_requests_are_sent_at_once_and_the_newest_of_those_that_follow_later() -> None:
+    """As many as the robot takes; a second tear at once does not wait."""
     robot = PlayedRobot()
     with following(robot) as worker:
         begun_s = time.monotonic()
         wait_until(lambda: worker.request_key_frame(0), "it takes requests")
-        wait_until(lambda: robot.key_frames == [0], "the first request")
-        for pts in range(1, 100):
+        for pts in range(3):
             assert worker.request_key_frame(pts)
-        wait_until(lambda: len(robot.key_frames) >= 2, "the second request")
+            wait_until(lambda: pts in robot.key_frames, "a request of the burst")  # noqa: B023 - at once
+        for pts in range(3, 100):
+            assert worker.request_key_frame(pts)
+        wait_until(lambda: robot.key_frames[-1] == 99, "the last request")
         assert time.monotonic() - begun_s > 0.33
-    assert robot.key_frames == [0, 99]
+    assert len(robot.key_frames) <= 5
+
+
+@pytest.mark.parametrize(
+    "error",
+    [NotAllowed("a stranger"), Refused("the preview is off"), DeadlineExceeded("late"), TimeoutError()],
+)
+def test_a_request_that_failed_leaves_it_to_a_new_connection_to_the_stream(
+    error: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("console.monitor.viewer_feedback._FAILED_FOR_S", 0.2)
+    robot = PlayedRobot()
+    robot.key_frame_error = error
+    with following(robot) as worker:
+        wait_until(lambda: worker.request_key_frame(1), "it takes requests")
+        wait_until(lambda: not worker.takes_requests(), "it does not any more")
+        assert not worker.request_key_frame(2)
+        robot.key_frame_error = None
+        wait_until(lambda: worker.request_key_frame(3), "another attempt")
+        wait_until(lambda: robot.key_frames == [1, 3], "the request")
+        assert worker.latest().link.state is LinkState.CONNECTED
+
+
+def test_a_request_that_is_not_answered_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("console.monitor.viewer_feedback._ANSWERED_WITHIN_S", 0.05)
+    robot = PlayedRobot()
+    robot.key_frames_hang = True
+    with following(robot) as worker:
+        wait_until(lambda: worker.request_key_frame(1), "it takes requests")
+        wait_until(lambda: not worker.takes_requests(), "it does not any more")
 
 
 def test_an_older_robot_is_asked_once() -> None:

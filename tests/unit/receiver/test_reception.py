@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import pytest
 
-from console.capture_time import CaptureClock
+from console.capture_time import WRAP_TICKS, CaptureClock, ticks_to_ns
 from console.receiver.delivery import Delivery, DeliveryChoice, LinkStatistics
 from console.receiver.options import ReceiverOptions
 from console.receiver.reception import Reception, wait_s
@@ -40,6 +40,7 @@ class Played:
     received: int = 0
     lost_share: float = 0.0
     full_until_s: float = 0.0
+    dropped_units: int = 0
     stopping: threading.Event = field(default_factory=threading.Event)
     until_s: float = 110.0
 
@@ -68,7 +69,12 @@ class Played:
         taken = self.now_s > self.full_until_s
         if taken:
             self.units.append(unit)
+        else:
+            self.dropped_units += 1
         return taken
+
+    def feed(self) -> None:
+        pass
 
     def check(self) -> None:
         pass
@@ -103,13 +109,16 @@ def send(
     *,
     lose: Callable[[int, int], bool] = lambda _frame, _packet: False,
     delay_s: Callable[[int], float] = lambda _frame: 0.0,
+    first_ticks: int = 0,
 ) -> None:
     """Sends frames at 30 per second, each in payloads of two packets; `lose` by frame and payload."""
     writer, number = Writer(), 0
     for frame in range(frames):
         key = frame % GOP == 0
         packets = [writer.tables()] if key else []
-        packets += writer.unit(coded_frame("h264", frame, key=key, size=1000), frame * TICKS)
+        packets += writer.unit(
+            coded_frame("h264", frame, key=key, size=1000), (first_ticks + frame * TICKS) % WRAP_TICKS
+        )
         content = b"".join(packets)
         for index, at in enumerate(range(0, len(content), 376)):
             if not lose(frame, index):
@@ -173,6 +182,20 @@ def test_where_no_request_is_made_the_connection_is_made_anew(played: Played) ->
     assert found.rejoins == 1
 
 
+def test_where_a_request_fails_the_connection_is_made_anew_at_once(played: Played) -> None:
+    """The answer comes 50 ms later: not allowed, for example."""
+    send(played, 200, lose=lambda frame, packet: frame >= 7 and packet == 1)
+
+    def takes_requests() -> bool:
+        failed = played.requests_s and played.now_s > played.requests_s[0] + 0.05
+        played.takes_requests = not failed
+        return not failed
+
+    found = played.run(on_picture_lost=played.request, takes_requests=takes_requests)
+    assert played.now_s == pytest.approx(100 + 7 / 30 + FIRST_WAIT_S + 0.2, abs=0.03)
+    assert found.rejoins == 1
+
+
 def test_without_a_request_the_connection_is_made_anew(played: Played) -> None:
     send(played, 200, lose=lambda frame, packet: frame >= 7 and packet == 1)
     found = played.run()
@@ -194,6 +217,8 @@ def test_a_decoder_that_is_too_slow_skips_to_a_key_frame(played: Played) -> None
     assert played.shown == list(range(15, 30))
     assert played.units[0].first
     assert found.dropped_frames == 15
+    assert played.requests_s == [], "another key frame makes it no faster"
+    assert found.rejoins == 0
 
 
 @pytest.mark.parametrize("clock", [True, False], ids=["by the robot's clock", "by what has grown"])
@@ -204,6 +229,30 @@ def test_the_age_of_the_frames_is_bounded(played: Played, clock: bool) -> None:
     found = played.run(capture=capture, max_age_s=1.0)
     assert found.rejoins == 1
     newest_s = played.shown[-1] / 30
+    assert played.now_s - 100.0 - newest_s == pytest.approx(1.0, abs=0.06)
+
+
+@pytest.mark.parametrize("clock", [True, False], ids=["by the robot's clock", "by what has grown"])
+def test_a_wrap_of_the_pts_is_no_age(played: Played, clock: bool) -> None:
+    """It comes every 26.5 h."""
+    first_ticks = WRAP_TICKS - 30 * TICKS
+    send(played, 60, first_ticks=first_ticks)
+    first_ns = ticks_to_ns(first_ticks)
+    capture = CaptureClock(0, lambda: first_ns + int((played.now_s - 100.0) * 1e9)) if clock else None
+    found = played.run(capture=capture)
+    assert found.rejoins == 0
+    assert [unit.pts_ticks for unit in played.units[29:31]] == [WRAP_TICKS - TICKS, 0]
+    assert len(played.units) == 60
+
+
+@pytest.mark.parametrize("clock", [True, False], ids=["by the robot's clock", "by what has grown"])
+def test_over_a_wrap_of_the_pts_the_age_is_bounded_as_ever(played: Played, clock: bool) -> None:
+    first_ticks = WRAP_TICKS - 30 * TICKS
+    send(played, 120, delay_s=lambda frame: 0.02 * frame, first_ticks=first_ticks)
+    first_ns = ticks_to_ns(first_ticks)
+    capture = CaptureClock(0, lambda: first_ns + int((played.now_s - 100.0) * 1e9)) if clock else None
+    assert played.run(capture=capture, max_age_s=1.0).rejoins == 1
+    newest_s = (len(played.units) - 1) / 30
     assert played.now_s - 100.0 - newest_s == pytest.approx(1.0, abs=0.06)
 
 

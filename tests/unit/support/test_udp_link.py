@@ -4,7 +4,7 @@ import socket
 
 import pytest
 
-from tests.support.udp_link import Direction, Impairment, UdpLink
+from tests.support.udp_link import Direction, Impairment, Line, UdpLink
 
 DATA = b"\x00" * 1000
 CONTROL = b"\x80" + b"\x00" * 999
@@ -41,6 +41,38 @@ def test_packets_wait_before_the_bottleneck_until_its_queue_is_full() -> None:
     arrivals = [direction.arrival_s(DATA, 1.0) for _ in range(6)]
     assert arrivals == [pytest.approx(1.0 + 0.1 + number * 0.01) for number in (1, 2, 3, 4)] + [None, None]
     assert direction.arrival_s(DATA, 2.0) == pytest.approx(2.11)
+
+
+def test_with_jitter_packets_overtake_each_other() -> None:
+    direction = Direction(Impairment(delay_s=0.02, jitter_s=0.01), 1)
+    arrivals = [direction.arrival_s(DATA, 1.0) or 0.0 for _ in range(100)]
+    assert all(1.02 <= each <= 1.03 for each in arrivals)
+    assert arrivals != sorted(arrivals)
+    line = Line[int](Direction(Impairment(jitter_s=0.01), 1))
+    for number in range(100):
+        line.send(DATA, number)
+    found = line.arrived(float("inf"))
+    assert found != sorted(found)
+    assert sorted(found) == list(range(100))
+
+
+def test_without_jitter_none_is_overtaken_also_when_the_delay_falls() -> None:
+    """TCP links are made of the same parts, and their bytes must stay in order."""
+    impairment = Impairment(delay_s=0.5)
+    line = Line[int](Direction(impairment, 1))
+    line.send(DATA, 1)
+    impairment.delay_s = 0.0
+    line.send(DATA, 2)
+    assert line.arrived(float("inf")) == [1, 2]
+
+
+def test_some_packets_come_twice() -> None:
+    line = Line[int](Direction(Impairment(duplicates=0.1), 1))
+    for number in range(1000):
+        line.send(DATA, number)
+    found = line.arrived(float("inf"))
+    assert set(found) == set(range(1000))
+    assert 1060 < len(found) < 1140
 
 
 def test_callers_and_listener_talk_through_the_link() -> None:

@@ -7,6 +7,7 @@ import pytest
 from console.client import Offset, PictureDelivery
 from console.receiver.delivery import Delivery, DeliveryChoice
 from console.viewer.picture_meter import HISTORY_SLOTS, PictureMeter
+from console.viewer.picture_reading import AgeCause
 from tests.unit.receiver.frames import frame
 
 OFFSET_S = 3600.0
@@ -19,9 +20,12 @@ class Played:
     now_s: float = 100.0
     offset: Offset | None = field(default_factory=lambda: Offset(OFFSET_S, 0.0015))
     delivery: Delivery | None = None
+    received_s: float | None = None
 
     def __post_init__(self) -> None:
-        self.meter = PictureMeter(lambda: self.offset, lambda: self.delivery)
+        self.meter = PictureMeter(
+            lambda: self.offset, lambda: self.delivery, received=lambda: self.received_s
+        )
 
     def show(self, age_ms: float, own_ms: float | None = None) -> None:
         """Shows a frame that was captured so long ago."""
@@ -104,6 +108,25 @@ def test_a_frozen_picture_is_reported_with_its_age_now(played: Played) -> None:
     assert report.picture_age_ms == 60_000
 
 
+def test_time_on_this_computer_is_not_of_the_link(played: Played) -> None:
+    """A slow decoder, and then one that hangs while pictures go on coming; at last none come any more."""
+    played.show(700, own_ms=650)
+    report = played.meter.report()
+    assert report
+    assert (report.picture_age_ms, report.link_age_ms) == (700, 50)
+    played.now_s += 2.0
+    played.received_s = played.now_s - 0.03
+    report = played.meter.report()
+    assert report
+    assert (report.picture_age_ms, report.link_age_ms) == (2700, 50)
+    assert played.meter.reading().cause is AgeCause.DECODER
+    played.now_s += 1.0
+    report = played.meter.report()
+    assert report
+    assert (report.picture_age_ms, report.link_age_ms) == (3700, 1080)
+    assert played.meter.reading().cause is AgeCause.LINK
+
+
 def test_two_viewers_have_two_names(played: Played) -> None:
     other = Played(played.now_s)
     for each in (played, other):
@@ -124,6 +147,17 @@ def test_the_history_has_the_largest_age_of_each_half_second(played: Played) -> 
     assert set(history[:-3]) == {None}
     played.now_s += 1000.0
     assert set(played.meter.history()) == {None}
+
+
+def test_the_worst_age_of_a_moment_has_short_peaks_and_what_is_frozen(played: Played) -> None:
+    assert played.meter.worst_ms(0.5) is None
+    for age_ms in (300, 20, 90, 30):
+        played.show(age_ms)
+        played.now_s += 0.2
+    assert played.meter.worst_ms(0.5) == pytest.approx(230, abs=1), "30 ms old 0.2 s ago, and no newer one"
+    assert played.meter.worst_ms(0.9) == pytest.approx(300, abs=1e-3)
+    played.meter.forget()
+    assert played.meter.worst_ms(0.5) is None
 
 
 def test_the_summary_has_percentiles(played: Played) -> None:

@@ -26,9 +26,11 @@ class Exchange:
     """Every connection that was made; a test puts frames and ends into the queues."""
 
     refuse: bool = False
+    hangs: bool = False
     calls: list[tuple[StreamAddress, FrameQueue]] = field(default_factory=list)
     open: int = 0
     delivery: Delivery = field(default_factory=lambda: Delivery(kind=DeliveryChoice.DIRECT, rtt_ms=7.0))
+    received_s: float | None = 12.5
     options: list[ReceiverOptions] = field(default_factory=list)
 
     def connect(self, address: StreamAddress, queue: FrameQueue, options: ReceiverOptions) -> "Exchange":
@@ -39,8 +41,9 @@ class Exchange:
             queue.end(from_srt(address, "Incorrect passphrase", had_data=False))
         return self
 
-    def close(self) -> None:
+    def close(self) -> bool:
         self.open -= 1
+        return not self.hangs
 
     def show(self) -> Frame:
         """A frame arrives over the latest connection."""
@@ -179,6 +182,38 @@ def test_what_cannot_be_decoded_blocks(session: VideoSession, exchange: Exchange
     assert session.playback().remedy == "Look at the port"
 
 
+def test_a_connection_that_cannot_be_closed_is_left_behind_and_said_so(
+    session: VideoSession, exchange: Exchange
+) -> None:
+    exchange.hangs = True
+    session.follow(preview(PreviewState.RUNNING))
+    for number in (1, 2):
+        called(exchange, number)
+        address, queue = exchange.calls[-1]
+        queue.end(ended(address, "lost"))
+        wait_until(lambda: "did not stop within 2 s" in session.playback().reason, "the reason")
+    exchange.hangs = False
+    called(exchange, 3)
+    exchange.show()
+    wait_until(lambda: session.playback().state is PlaybackState.LIVE, "the video goes on")
+
+
+def test_connections_that_cannot_be_closed_are_no_more_than_three(
+    session: VideoSession, exchange: Exchange
+) -> None:
+    """Each keeps a thread, and maybe a driver."""
+    exchange.hangs = True
+    session.follow(preview(PreviewState.RUNNING))
+    for number in (1, 2, 3):
+        called(exchange, number)
+        address, queue = exchange.calls[-1]
+        queue.end(ended(address, "lost"))
+    wait_until(lambda: session.playback().state is PlaybackState.BLOCKED, "no further one")
+    assert "3 receivers did not stop" in session.playback().reason
+    assert session.playback().remedy == "Close the window and open it again"
+    assert len(exchange.calls) == 3
+
+
 def test_a_session_that_never_began_can_be_closed() -> None:
     assert VideoSession().close()
 
@@ -195,6 +230,7 @@ def test_the_receiver_gets_what_the_session_was_given(exchange: Exchange) -> Non
         delivery=DeliveryChoice.SRT,
         robot_now_ns=lambda: 5_000_000_000,
         on_picture_lost=request,
+        takes_requests=lambda: not requests,
     )
     assert session.delivery() is None
     session.start()
@@ -208,6 +244,7 @@ def test_the_receiver_gets_what_the_session_was_given(exchange: Exchange) -> Non
     assert options.on_picture_lost
     assert options.on_picture_lost(90_000)
     assert requests == [90_000]
+    assert not options.takes_requests()
 
 
 def test_frames_get_capture_times_where_the_endpoint_has_an_offset(exchange: Exchange) -> None:

@@ -656,6 +656,7 @@ def test_every_field_of_a_picture_report_is_set() -> None:
         packets_held=300,
         packets_given_up=4,
         delivery=PictureDelivery.DIRECT,
+        link_age_ms=90,
     )
     request = robot_gateway_pb2.ReportPictureRequest.FromString(picture_request(report))
     found = {field.name: value for field, value in request.ListFields()}

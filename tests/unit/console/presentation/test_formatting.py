@@ -1,3 +1,4 @@
+import time
 from datetime import UTC
 
 import pytest
@@ -11,6 +12,8 @@ from console.presentation.formatting import (
     quantity,
     signed,
     wall_clock,
+    with_component,
+    without_component,
 )
 
 
@@ -61,8 +64,28 @@ def test_empty_parts_leave_no_comma() -> None:
 
 
 def test_a_time_of_day() -> None:
-    assert wall_clock(1_795_302_000_999, UTC) == "2026-11-21 23:00:00"
-    assert len(wall_clock(1_795_302_000_999)) == len("2026-11-21 23:00:00")
+    assert wall_clock(1_795_302_000_999, UTC) == "2026-11-21 23:00:00 UTC"
+    assert wall_clock(1_795_302_000_999).split()[2] in time.tzname
+
+
+@pytest.mark.parametrize(
+    ("component", "message", "after", "beside"),
+    [
+        ("odometry", "Odometry stopped coming", "Odometry stopped coming", "Odometry stopped coming"),
+        ("drive: motor", "drive: motor: failed", "drive: motor: failed", "failed"),
+        (
+            "preview",
+            "the preview service is gone",
+            "the preview service is gone",
+            "the preview service is gone",
+        ),
+        ("power", "the battery is low", "power: the battery is low", "the battery is low"),
+        ("Drive", "drive: jammed", "drive: jammed", "jammed"),
+    ],
+)
+def test_a_component_is_said_once(component: str, message: str, after: str, beside: str) -> None:
+    assert with_component(component, message) == after
+    assert without_component(component, message) == beside
 
 
 @pytest.mark.parametrize(

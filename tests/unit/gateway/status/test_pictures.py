@@ -59,6 +59,15 @@ def test_an_age_is_not_below_zero_whatever_its_error(reports: PictureReports) ->
     assert reports.counting(AT_S).link_age_ms == 0
 
 
+def test_what_waits_on_the_viewers_computer_is_not_of_the_link(reports: PictureReports) -> None:
+    reports.take("anna", "", replace(REPORT, age_ms=900, link_age_ms=30), AT_S)
+    assert reports.counting(AT_S) == Pictures(1, 900, 28)
+    reports.take("anna", "", replace(REPORT, age_ms=LONGEST_OF_LINK_MS + 1, link_age_ms=30), AT_S)
+    assert reports.counting(AT_S).link_age_ms == 28
+    reports.take("anna", "", replace(REPORT, age_ms=900, link_age_ms=LONGEST_OF_LINK_MS + 1), AT_S)
+    assert reports.counting(AT_S).link_age_ms is None
+
+
 def test_an_age_that_no_link_causes_is_shown_and_goes_no_further(reports: PictureReports) -> None:
     reports.take("anna", "", replace(REPORT, age_ms=LONGEST_OF_LINK_MS + 1), AT_S)
     assert reports.counting(AT_S) == Pictures(1, LONGEST_OF_LINK_MS + 1, None)

@@ -442,6 +442,7 @@ class ReportPictureRequest(_message.Message):
     PACKETS_HELD_FIELD_NUMBER: _builtins.int
     PACKETS_GIVEN_UP_FIELD_NUMBER: _builtins.int
     DELIVERY_FIELD_NUMBER: _builtins.int
+    LINK_AGE_MS_FIELD_NUMBER: _builtins.int
     viewer_id: _builtins.str
     """Names the viewer among those of the same caller; printable ASCII characters, chosen by the client.
     Empty for a caller with one viewer.
@@ -462,6 +463,10 @@ class ReportPictureRequest(_message.Message):
     """Packets that were given up, since the viewer connected."""
     delivery: _preview_pb2.PictureDelivery.ValueType
     """How the viewer takes the stream."""
+    link_age_ms: _builtins.int
+    """picture_age_ms as far as the link may have caused it: without the time that pictures waited on the
+    viewer's computer. The adaptive bit rate follows it. Unset where it is not known: picture_age_ms counts.
+    """
     def __init__(
         self,
         *,
@@ -473,15 +478,20 @@ class ReportPictureRequest(_message.Message):
         packets_held: _builtins.int = ...,
         packets_given_up: _builtins.int = ...,
         delivery: _preview_pb2.PictureDelivery.ValueType = ...,
+        link_age_ms: _builtins.int | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["_loss_percent", b"_loss_percent", "_rtt_ms", b"_rtt_ms", "loss_percent", b"loss_percent", "rtt_ms", b"rtt_ms"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_link_age_ms", b"_link_age_ms", "_loss_percent", b"_loss_percent", "_rtt_ms", b"_rtt_ms", "link_age_ms", b"link_age_ms", "loss_percent", b"loss_percent", "rtt_ms", b"rtt_ms"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_loss_percent", b"_loss_percent", "_rtt_ms", b"_rtt_ms", "delivery", b"delivery", "loss_percent", b"loss_percent", "packets_given_up", b"packets_given_up", "packets_held", b"packets_held", "picture_age_error_ms", b"picture_age_error_ms", "picture_age_ms", b"picture_age_ms", "rtt_ms", b"rtt_ms", "viewer_id", b"viewer_id"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_link_age_ms", b"_link_age_ms", "_loss_percent", b"_loss_percent", "_rtt_ms", b"_rtt_ms", "delivery", b"delivery", "link_age_ms", b"link_age_ms", "loss_percent", b"loss_percent", "packets_given_up", b"packets_given_up", "packets_held", b"packets_held", "picture_age_error_ms", b"picture_age_error_ms", "picture_age_ms", b"picture_age_ms", "rtt_ms", b"rtt_ms", "viewer_id", b"viewer_id"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    _WhichOneofReturnType__link_age_ms: _TypeAlias = _typing.Literal["link_age_ms"]  # noqa: Y015
+    _WhichOneofArgType__link_age_ms: _TypeAlias = _typing.Literal["_link_age_ms", b"_link_age_ms"]  # noqa: Y015
     _WhichOneofReturnType__loss_percent: _TypeAlias = _typing.Literal["loss_percent"]  # noqa: Y015
     _WhichOneofArgType__loss_percent: _TypeAlias = _typing.Literal["_loss_percent", b"_loss_percent"]  # noqa: Y015
     _WhichOneofReturnType__rtt_ms: _TypeAlias = _typing.Literal["rtt_ms"]  # noqa: Y015
     _WhichOneofArgType__rtt_ms: _TypeAlias = _typing.Literal["_rtt_ms", b"_rtt_ms"]  # noqa: Y015
+    @_typing.overload
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__link_age_ms) -> _WhichOneofReturnType__link_age_ms | None: ...
     @_typing.overload
     def WhichOneof(self, oneof_group: _WhichOneofArgType__loss_percent) -> _WhichOneofReturnType__loss_percent | None: ...
     @_typing.overload

@@ -783,7 +783,9 @@ class ReportPictureAgeRequest(_message.Message):
 
     AGE_MS_FIELD_NUMBER: _builtins.int
     age_ms: _builtins.int
-    """Age in ms of the oldest picture that any viewer shows, less the bound of its error."""
+    """Age in ms of the oldest picture that any viewer shows, as far as the link may have caused it, less the
+    bound of its error.
+    """
     def __init__(
         self,
         *,

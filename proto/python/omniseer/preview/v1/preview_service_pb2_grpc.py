@@ -114,7 +114,8 @@ class PreviewServiceServicer:
 
     def ReportPictureAge(self, request, context):
         """Reports the age of the oldest picture that a viewer shows, for the adaptive bit rate. The newest
-        report counts, for 3 s, and only while a viewer is connected.
+        report counts, for 3 s, and only while a viewer is connected. None counts while the camera itself
+        delivers nothing, nor for 3 s after that.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -61,7 +61,8 @@ class PreviewServiceStub:
     """
     ReportPictureAge: _grpc.UnaryUnaryMultiCallable[_preview_service_pb2.ReportPictureAgeRequest, _preview_service_pb2.ReportPictureAgeResponse]
     """Reports the age of the oldest picture that a viewer shows, for the adaptive bit rate. The newest
-    report counts, for 3 s, and only while a viewer is connected.
+    report counts, for 3 s, and only while a viewer is connected. None counts while the camera itself
+    delivers nothing, nor for 3 s after that.
     """
 
 @_typing.type_check_only
@@ -97,7 +98,8 @@ class PreviewServiceAsyncStub(PreviewServiceStub):
     """
     ReportPictureAge: _aio.UnaryUnaryMultiCallable[_preview_service_pb2.ReportPictureAgeRequest, _preview_service_pb2.ReportPictureAgeResponse]  # type: ignore[assignment]
     """Reports the age of the oldest picture that a viewer shows, for the adaptive bit rate. The newest
-    report counts, for 3 s, and only while a viewer is connected.
+    report counts, for 3 s, and only while a viewer is connected. None counts while the camera itself
+    delivers nothing, nor for 3 s after that.
     """
 
 class PreviewServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -160,7 +162,8 @@ class PreviewServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_preview_service_pb2.ReportPictureAgeResponse, _abc.Awaitable[_preview_service_pb2.ReportPictureAgeResponse]]:
         """Reports the age of the oldest picture that a viewer shows, for the adaptive bit rate. The newest
-        report counts, for 3 s, and only while a viewer is connected.
+        report counts, for 3 s, and only while a viewer is connected. None counts while the camera itself
+        delivers nothing, nor for 3 s after that.
         """
 
 def add_PreviewServiceServicer_to_server(servicer: PreviewServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...
