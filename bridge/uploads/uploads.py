@@ -41,6 +41,7 @@ from bridge.uploads.queue import (
 )
 from bridge.uploads.receivers import Receivers, Requests
 from bridge.uploads.route import interface_to
+from bridge.uploads.unconfirmed import Unconfirmed
 from common.backoff import Backoff
 from common.errors import NotFoundError, PreconditionError, TooMuchError
 from common.reasons import Reason
@@ -53,6 +54,17 @@ _TICK_S: Final = 1.0
 """How often the gates are looked at."""
 _RATE_TICKS: Final = 5
 """Over how many the rate is measured."""
+
+_STATES: Final = {
+    State.LOCAL: results.RecordingCopyState.UNKNOWN,
+    State.QUEUED: results.RecordingCopyState.QUEUED,
+    State.UPLOADING: results.RecordingCopyState.UPLOADING,
+    State.VERIFYING: results.RecordingCopyState.VERIFYING,
+    State.VERIFIED: results.RecordingCopyState.VERIFIED,
+    State.PAUSED: results.RecordingCopyState.PAUSED,
+    State.FAILED: results.RecordingCopyState.FAILED,
+}
+"""As the recorder keeps them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,6 +118,8 @@ class Uploads:
         self._disk = asyncio.Lock()
         self._sender: PartSender | None = None
         self._sent = deque[tuple[float, int]](maxlen=_RATE_TICKS)
+        self.unconfirmed = Unconfirmed()
+        """Those that the recorder may not have as they are."""
         self.loaded = asyncio.Event()
         """Set once the queue has been read from the disk."""
         self.paused = ""
@@ -124,6 +138,10 @@ class Uploads:
     def settled(self) -> list[Upload]:
         """Those that are verified, or were taken from the queue; the newest first."""
         return [each for each in reversed(self._uploads.values()) if each.state not in WAITING]
+
+    def get(self, recording_id: str) -> Upload | None:
+        """Returns the upload of a recording, in whatever state; None if there is none."""
+        return self._uploads.get(recording_id)
 
     @property
     def current(self) -> Upload | None:
@@ -195,10 +213,12 @@ class Uploads:
         return upload
 
     async def consider(self, recordings: Iterable[results.Recording]) -> None:
-        """Queues those of some recordings that the rule selects, and that have ended."""
+        """Takes recordings of the recorder's list, and queues those that have ended and the rule selects."""
         await self.loaded.wait()
         for recording in sorted(recordings, key=lambda each: each.started_unix_ms):
             known = self._uploads.get(recording.id)
+            if known:
+                self.unconfirmed.listed(recording.id, confirmed=_is_known(known, recording.copy))
             if not ended(recording) or not _selects(self._settings.rule, recording):
                 continue
             if known is None and recording.copy.state is not results.RecordingCopyState.VERIFIED:
@@ -237,6 +257,8 @@ class Uploads:
             rows = []
         for upload in rows:
             self._uploads[upload.recording_id] = step(upload, Event.RESTART, self._now_s)
+        for upload in reversed(self.waiting):
+            self.unconfirmed.changed(upload.recording_id)
         self.loaded.set()
 
     async def _next_tick(self) -> None:
@@ -404,6 +426,7 @@ class Uploads:
 
     def _drop(self, recording_id: str) -> None:
         self._uploads.pop(recording_id, None)
+        self.unconfirmed.removed(recording_id)
         self._changed()
 
     def _put(self, upload: Upload) -> None:
@@ -412,6 +435,8 @@ class Uploads:
             # In the order of their changes.
             del self._uploads[upload.recording_id]
         self._uploads[upload.recording_id] = upload
+        if before is None or (before.state, before.reason) != (upload.state, upload.reason):
+            self.unconfirmed.changed(upload.recording_id)
         self._changed()
 
     def _note_disk(self, error: OSError) -> None:
@@ -445,6 +470,11 @@ def _new(recording: results.Recording, lowest: Priority = Priority.OTHER) -> Upl
         started_unix_ms=recording.started_unix_ms,
         size=recording.size,
     )
+
+
+def _is_known(upload: Upload, copy: results.RecordingCopy) -> bool:
+    """Returns whether the recorder has an upload as it is, but for its bytes, which change all the time."""
+    return (copy.state, copy.reason) == (_STATES[upload.state], upload.reason)
 
 
 def _differs(upload: Upload, recording: results.Recording) -> bool:
