@@ -3,6 +3,8 @@
 import re
 from typing import Final
 
+LARGEST_MESSAGE: Final = 512 * 1024
+"""Bytes that streams take and credentials permit; a server disconnects a client that sends more."""
 INBOXES: Final = "_INBOX"
 """Prefix of the inboxes of people and programs of the hub, which share it."""
 ROBOT_NAME: Final = re.compile(r"[a-z0-9](?:[a-z0-9-]{0,61}[a-z0-9])?")

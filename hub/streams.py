@@ -121,7 +121,7 @@ def _stream(subjects: str, max_bytes: int, max_age_ns: int, more: Mapping[str, A
         "storage": "file",
         "max_bytes": max_bytes,
         "max_age": max_age_ns,
-        "max_msg_size": 512 * 1024,
+        "max_msg_size": names.LARGEST_MESSAGE,
         # Repeats are recognised by their subject, without a window of time.
         "duplicate_window": 1_000_000_000,
         "deny_delete": True,
@@ -138,7 +138,7 @@ def _bucket(name: str, max_bytes: int) -> dict[str, Any]:
         "storage": "file",
         "max_msgs_per_subject": 1,
         "max_bytes": max_bytes,
-        "max_msg_size": 512 * 1024,
+        "max_msg_size": names.LARGEST_MESSAGE,
         "discard": "new",
         # A robot's "Nats-Rollup: all" would delete the values of all others.
         "allow_rollup_hdrs": False,

@@ -26,7 +26,8 @@ from typing import Any, Final, ParamSpec, Protocol, TypeVar
 
 from google.protobuf.message import DecodeError, Message
 
-from fleet.names import RECORDINGS
+from fleet.errors import HubError, HubReason
+from fleet.names import LARGEST_MESSAGE, RECORDINGS
 from fleet.receipt_keys import ReceiptError, ReceiptSigner, confirmed, digest_of
 from hub.receiver.keys import BadNameError, RecordingKeys, checked
 from hub.receiver.store import PART_BYTES, URL_VALID_S, Store, StoredObject, StoreError, StoreProblem
@@ -47,8 +48,8 @@ _LONGEST_ID: Final = 2048
 _LONGEST_ETAG: Final = 128
 _RECEIPT_BYTES: Final = 8192
 _RECORD_BYTES: Final = 4 * 1024 * 1024
-_MOST_IN_RECORD: Final = 768 * 1024
-"""Of a StoredRecording in the bucket: a message of the hub has at most 1 MiB."""
+_MOST_IN_RECORD: Final = LARGEST_MESSAGE
+"""Of a StoredRecording in the bucket, in bytes; a larger one is listed without its files."""
 _SHORTEST_S: Final = 600.0
 _SLOWEST_BYTES_PER_S: Final = 1024 * 1024
 _AT_ONCE: Final = 8
@@ -145,6 +146,8 @@ class ReceiverService:
         async def send_part(part: Message) -> None:
             response: Any = pb.UploadResponse()
             getattr(response, name).CopyFrom(part)
+            if response.ByteSize() > LARGEST_MESSAGE:
+                raise Refusal(pb.UPLOAD_ERROR_CODE_INVALID, "the answer is too large for the hub")
             await send(response)
 
         try:
@@ -398,10 +401,24 @@ class ReceiverService:
         return self._party.signer.sign(receipt)
 
     async def _list(self, robot: str, stored: pb.StoredRecording) -> None:
-        """Lists a recording in the hub's bucket."""
+        """Lists a recording in the hub's bucket.
+
+        Raises:
+            Refusal: The hub has no place for it.
+            HubError: The hub does not answer.
+        """
         if stored.ByteSize() > _MOST_IN_RECORD:
             stored = pb.StoredRecording(recording=stored.recording, receipt=stored.receipt)
-        await self._records.put(RECORDINGS, f"{robot}.{stored.recording.id}", stored.SerializeToString())
+        try:
+            await self._records.put(RECORDINGS, f"{robot}.{stored.recording.id}", stored.SerializeToString())
+        except HubError as error:
+            if error.reason is HubReason.TOO_LARGE:
+                text = "the description of the recording is too large for the hub"
+                raise Refusal(pb.UPLOAD_ERROR_CODE_INVALID, text) from error
+            if error.reason is HubReason.FULL:
+                text = "the hub's list of recordings is full"
+                raise Refusal(pb.UPLOAD_ERROR_CODE_STORE, text) from error
+            raise
 
     def _keys(self, robot: str, recording_id: str) -> RecordingKeys:
         return RecordingKeys(self._party.fleet, robot, recording_id)
