@@ -6,6 +6,7 @@
 | a more urgent recording is queued | it takes the place of the one that is uploaded |
 | an attempt fails because of this recording | FAILED; again after 1, 2, 4 ... 300 s; others go on |
 | gateway, hub or store fail | FAILED; all wait 1, 2, 4 ... 300 s, and from 1 s again after progress |
+| they fail three times at one recording, without progress | as a failure of that one: others go on |
 | the recording is deleted on the robot | it leaves the queue |
 | the bridge's disk fails | the queue goes on in memory; `disk_error` says why; a new request is refused |
 """
@@ -37,6 +38,7 @@ from bridge.uploads.queue import (
     UploadStore,
     in_order,
     next_upload,
+    progressed,
     step,
 )
 from bridge.uploads.receivers import Receivers, Requests
@@ -282,7 +284,8 @@ class Uploads:
             for each in self.waiting:
                 if each.state is State.PAUSED:
                     await self._apply(each.recording_id, Event.RESUME)
-        head = next_upload(self._uploads.values(), self._now_s)
+        path_works = not self._path.failures
+        head = next_upload(self._uploads.values(), self._now_s, path_works=path_works)
         if closed:
             await self._pause(head, closed)
         elif head:
@@ -328,7 +331,7 @@ class Uploads:
             upload = self._uploads[recording_id]
             if done > upload.bytes_done:
                 self._path.reset()
-            self._put(replace(upload, bytes_done=min(done, upload.size)))
+            self._put(progressed(upload, done))
 
         def sent() -> None:
             self._put(step(self._uploads[recording_id], Event.SENT, self._now_s))

@@ -138,6 +138,27 @@ async def test_a_store_that_refuses_is_tried_again(
         assert running.uploads.cuts == 1
 
 
+async def test_a_recording_that_the_store_refuses_for_ever_holds_up_no_other(ground: Ground) -> None:
+    robot = Robot()
+    robot.add("poison", {"data.bin": b"x"}, kind=wire.RECORDING_KIND_INCIDENT)
+    for number in range(3):
+        robot.add(f"good-{number}", {"data.bin": b"data"})
+    ground.proxy.refused = "/poison/"
+    async with (
+        running_receiver(ground.receivers[0]),
+        running_uploads(robot, ground.hub, ground.proxy.host, ground.keys) as running,
+    ):
+        for recording_id in robot.recordings:
+            await running.uploads.enqueue(recording_id)
+        for number in range(3):
+            await running.until(f"good-{number}", is_in(State.VERIFIED))
+        poison = await running.until("poison", is_in(State.FAILED))
+        assert poison
+        assert "400 InvalidRequest" in poison.reason
+        ground.proxy.refused = ""
+        await running.until("poison", is_in(State.VERIFIED))
+
+
 async def test_wrong_bytes_are_deleted_and_sent_again(ground: Ground) -> None:
     robot = Robot()
     robot.add("one", {"data.bin": content(9 * MIB)})
