@@ -9,6 +9,7 @@
 | they fail three times at one recording, without progress | as a failure of that one: others go on |
 | the recording is deleted on the robot | it leaves the queue |
 | the bridge's disk fails | the queue goes on in memory; `disk_error` says why; a new request is refused |
+| the queue on the disk is lost | what the recorder expects to be copied is queued again |
 """
 
 import asyncio
@@ -114,6 +115,8 @@ class Uploads:
         self._wake = asyncio.Event()
         self._path = Backoff(FIRST_PAUSE_S, LONGEST_PAUSE_S)
         self._path_due_s = 0.0
+        self._load_pause = Backoff(FIRST_PAUSE_S, LONGEST_PAUSE_S)
+        self._load_due_s = 0.0
         self._running: tuple[str, asyncio.Task[None]] | None = None
         self._ending = set[asyncio.Task[None]]()
         """Attempts that were cancelled and still close their connections."""
@@ -123,7 +126,7 @@ class Uploads:
         self.unconfirmed = Unconfirmed()
         """Those that the recorder may not have as they are."""
         self.loaded = asyncio.Event()
-        """Set once the queue has been read from the disk."""
+        """Set once the queue has been read from the disk, or that has failed."""
         self.paused = ""
         """Why nothing is uploaded although something waits, for people. Otherwise empty."""
         self.disk_error = ""
@@ -215,18 +218,25 @@ class Uploads:
         return upload
 
     async def consider(self, recordings: Iterable[results.Recording]) -> None:
-        """Takes recordings of the recorder's list, and queues those that have ended and the rule selects."""
+        """Takes recordings of the recorder's list, and queues those that have ended and are to be copied.
+
+        Those are what the rule selects, and what the recorder expects to be copied although it is not in the
+        queue: that was lost with the bridge's disk.
+        """
         await self.loaded.wait()
+        room = self._room
         for recording in sorted(recordings, key=lambda each: each.started_unix_ms):
             known = self._uploads.get(recording.id)
             if known:
                 self.unconfirmed.listed(recording.id, confirmed=_is_known(known, recording.copy))
-            if not ended(recording) or not _selects(self._settings.rule, recording):
+            if not ended(recording):
                 continue
-            if known is None and recording.copy.state is not results.RecordingCopyState.VERIFIED:
-                if self._has_room_for(recording.id):
-                    await self._keep(step(_new(recording), Event.ENQUEUE, self._now_s))
-            elif known and known.state is State.VERIFIED and _differs(known, recording):
+            selected = _selects(self._settings.rule, recording)
+            if known is None and _is_wanted(recording, selected=selected) and room > 0:
+                lowest = Priority.OTHER if selected else Priority.BY_HAND
+                await self._keep(step(_new(recording, lowest), Event.ENQUEUE, self._now_s))
+                room = self._room
+            elif known and selected and known.state is State.VERIFIED and _differs(known, recording):
                 await self._keep(step(known, Event.CHANGED, self._now_s))
         self._wake.set()
 
@@ -241,8 +251,9 @@ class Uploads:
         try:
             async with PartSender(self._settings) as sender:
                 self._sender = sender
-                await self._load()
                 while not stop.is_set():
+                    if self._now_s >= self._load_due_s:
+                        await self._load()
                     await self._tick()
                     await self._next_tick()
         finally:
@@ -252,15 +263,22 @@ class Uploads:
             await asyncio.gather(*self._ending, return_exceptions=True)
 
     async def _load(self) -> None:
+        """Reads the queue from the disk, once; where that fails, again later.
+
+        What has happened to a recording meanwhile counts.
+        """
         try:
             rows = await self._store.uploads()
         except OSError as error:
             self._note_disk(error)
-            rows = []
-        for upload in rows:
-            self._uploads[upload.recording_id] = step(upload, Event.RESTART, self._now_s)
-        for upload in reversed(self.waiting):
-            self.unconfirmed.changed(upload.recording_id)
+            self._load_due_s = self._now_s + self._load_pause.next_s()
+        else:
+            for upload in rows:
+                self._uploads.setdefault(upload.recording_id, step(upload, Event.RESTART, self._now_s))
+            for upload in reversed(self.waiting):
+                self.unconfirmed.changed(upload.recording_id)
+            self.disk_error = ""
+            self._load_due_s = float("inf")
         self.loaded.set()
 
     async def _next_tick(self) -> None:
@@ -452,7 +470,12 @@ class Uploads:
 
     def _has_room_for(self, recording_id: str) -> bool:
         known = self._uploads.get(recording_id)
-        return (known is not None and known.state in WAITING) or len(self.waiting) < MOST_WAITING
+        return (known is not None and known.state in WAITING) or self._room > 0
+
+    @property
+    def _room(self) -> int:
+        """How many more may wait."""
+        return MOST_WAITING - sum(each.state in WAITING for each in self._uploads.values())
 
     @property
     def _now_s(self) -> float:
@@ -473,6 +496,17 @@ def _new(recording: results.Recording, lowest: Priority = Priority.OTHER) -> Upl
         started_unix_ms=recording.started_unix_ms,
         size=recording.size,
     )
+
+
+def _is_wanted(recording: results.Recording, *, selected: bool) -> bool:
+    """Returns whether a recording that the queue does not have is to be copied."""
+    match recording.copy.state:
+        case results.RecordingCopyState.VERIFIED:
+            return False
+        case results.RecordingCopyState.UNKNOWN:
+            return selected
+        case _:
+            return True
 
 
 def _is_known(upload: Upload, copy: results.RecordingCopy) -> bool:

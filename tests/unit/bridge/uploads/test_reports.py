@@ -77,6 +77,12 @@ class Gateway:
             await asyncio.sleep(0)
 
 
+def recorded_as(robot: Robot, name: str, state: results.RecordingCopyState) -> None:
+    """The recorder has the copy of a recording in this state."""
+    known = robot.recordings[name]
+    robot.recordings[name] = replace(known, copy=replace(known.copy, state=state))
+
+
 def rows_of(state: State) -> Rows:
     rows = Rows()
     rows.rows = {name: Upload(recording_id=name, size=1, state=state) for name in NAMES}
@@ -98,8 +104,8 @@ async def test_a_backlog_of_300_reaches_the_recorder(state: State) -> None:
         robot.add(name, {"data.bin": b"x"})
     recorder = Recorder(robot)
     before = results.RecordingCopyState.UPLOADING
-    for name, each in robot.recordings.items():
-        robot.recordings[name] = replace(each, copy=replace(each.copy, state=before))
+    for name in NAMES:
+        recorded_as(robot, name, before)
     hub: Any = None
     async with running_uploads(
         robot, hub, "127.0.0.1:9", (), rows_of(state), only_while_charging=True
