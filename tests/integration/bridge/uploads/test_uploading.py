@@ -81,6 +81,26 @@ async def test_a_recording_is_uploaded_read_again_and_confirmed(ground: Ground, 
         assert ground.proxy.total == SIZE
 
 
+@pytest.mark.parametrize("damage", [None, b"cut short"])
+async def test_a_receipt_counts_as_long_as_its_bytes_are_there(ground: Ground, damage: bytes | None) -> None:
+    robot, key = Robot(), f"{FLEET}/{ROBOT}/one/data/000001.mcap"
+    robot.add("one", FILES)
+    client, bucket = ground.server.client, ground.store.bucket
+    for _ in range(2):
+        # Each time the robot has forgotten that it was verified.
+        async with (
+            running_receiver(ground.receivers[0]),
+            running_uploads(robot, ground.hub, ground.proxy.host, ground.keys) as running,
+        ):
+            await running.uploads.enqueue("one")
+            await running.until("one", is_in(State.VERIFIED))
+        assert client.get_object(Bucket=bucket, Key=key)["Body"].read() == FILES["data/000001.mcap"]
+        client.delete_object(Bucket=bucket, Key=key)
+        if damage is not None:
+            client.put_object(Bucket=bucket, Key=key, Body=damage)
+    assert ground.proxy.total == SIZE + len(FILES["data/000001.mcap"]), "only what was missing is sent again"
+
+
 async def test_an_expired_url_is_renewed(ground: Ground) -> None:
     robot = Robot()
     robot.add("one", {"data.bin": content(20 * MIB)})
