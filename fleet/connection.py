@@ -268,6 +268,14 @@ class Hub:
         ) as deliveries:
             return await anext(deliveries, None)
 
+    async def count(self, stream: str, subjects: str, timeout_s: float = REQUEST_TIMEOUT_S) -> int:
+        """Returns how many messages of a stream have such subjects.
+
+        Raises:
+            HubError: it can't be read.
+        """
+        return await consuming.count(self._open(), stream, subjects, timeout_s)
+
     async def pull(self, stream: str, durable: str, batch: int = 16) -> AsyncGenerator[Delivery, None]:
         """Yields the messages of a durable consumer, over all lost connections. Each needs its `ack`."""
         pause = Backoff(FIRST_PAUSE_S, LONGEST_PAUSE_S)

@@ -38,6 +38,11 @@ def event_subject(robot: str, run_id: str, first_sequence: int) -> str:
     return f"fleet.{robot}.ev.{run_id}.{first_sequence}"
 
 
+def event_subjects(robot: str) -> str:
+    """Returns the subjects of all events of a robot."""
+    return f"fleet.{robot}.ev.>"
+
+
 def command_subject(robot: str, command_id: str) -> str:
     """Returns the subject of a command."""
     return f"fleet.{robot}.cmd.{command_id}"
