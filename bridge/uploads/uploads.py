@@ -395,9 +395,15 @@ class Uploads:
     async def _closed(self) -> str:
         if not self._settings.store_hosts:
             return "no store is configured: set uploads.store_hosts to HOST:PORT of the fleet's store"
-        interface = await interface_to(self._settings.store_hosts[0]) if self._settings.interfaces else ""
+        interface = await self._interface() if self._settings.interfaces else ""
         now = datetime.now().astimezone().time()
         return gates.closed(self._settings, Conditions(interface, now, self._charging()))
+
+    async def _interface(self) -> str:
+        """Returns the interface to the host that is sent to; while none is, an allowed one to any of them."""
+        sending = self._sender.host if self._sender and self._running else ""
+        found = [await interface_to(host) for host in ([sending] if sending else self._settings.store_hosts)]
+        return next((name for name in found if not gates.wrong_interface(self._settings, name)), found[0])
 
     async def _look_up(self, recording_id: str) -> results.Recording:
         try:
