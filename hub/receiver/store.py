@@ -224,16 +224,15 @@ class Store:
                 MultipartUpload={"Parts": [{"PartNumber": number, "ETag": etag} for number, etag in parts]},
             )
 
-    def open_uploads(self, prefix: str, most: int) -> list[OpenUpload]:
-        """Returns uploads that are not completed, so many at most."""
+    def open_uploads(self, prefix: str) -> Iterator[OpenUpload]:
+        """Yields the uploads that are not completed."""
         with _problems():
             pages = self._client.get_paginator("list_multipart_uploads").paginate(
                 Bucket=self._bucket, Prefix=prefix
             )
-            found = (each for page in pages for each in page.get("Uploads", []))
-            return [
-                OpenUpload(each["Key"], each["UploadId"], each["Initiated"]) for each in islice(found, most)
-            ]
+            for page in pages:
+                for each in page.get("Uploads", []):
+                    yield OpenUpload(each["Key"], each["UploadId"], each["Initiated"])
 
     def abort(self, upload: OpenUpload) -> None:
         """Deletes an upload and its parts; another receiver may have done so."""
