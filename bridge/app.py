@@ -116,7 +116,7 @@ def _queue(
         store=StoredUploads(kept),
         source=gateway,
         hub=hub,
-        charging=lambda: is_charging(status.newest),
+        charging=lambda: is_charging(status.current),
         changed=status.changes.notify_all,
     )
 

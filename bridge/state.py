@@ -61,11 +61,12 @@ def robot_state(own: Own, status: SystemStatus | None) -> pb.RobotState:
 
 
 def is_charging(status: SystemStatus | None) -> bool | None:
-    """Returns whether the main battery is being charged; None if that is not known."""
+    """Returns whether the main battery is being charged; None if that is not known, or not any more."""
     if status is None:
         return None
     battery = status.platform.power.lipo_battery
-    return battery.charging if battery.available and battery.charging_available else None
+    known = battery.available and battery.charging_available and not battery.stale
+    return battery.charging if known else None
 
 
 def same_but_for_time(state: pb.RobotState) -> bytes:
@@ -113,11 +114,11 @@ def _add_status(state: pb.RobotState, status: SystemStatus) -> None:
 
 
 def _add_platform(state: pb.RobotState, platform: PlatformStatus) -> None:
-    battery = platform.power.lipo_battery
-    if battery.available and battery.percentage_available:
+    battery, compute = platform.power.lipo_battery, platform.compute
+    if battery.available and battery.percentage_available and not battery.stale:
         state.battery_percent = _percent(battery.percentage)
-    if platform.compute.disk_available:
-        state.disk_used_percent = _percent(platform.compute.disk_used_percent)
+    if compute.disk_available and not compute.stale:
+        state.disk_used_percent = _percent(compute.disk_used_percent)
 
 
 def _brief(fault: fault_pb2.Fault) -> pb.FaultBrief:

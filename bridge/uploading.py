@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 from bridge.pauses import Pauses
 from bridge.robot.calls import GatewayCalls
-from bridge.uploads.queue import State, Upload
+from bridge.uploads.queue import RUNNING, State, Upload
 from common.errors import DomainError, NotFoundError, PreconditionError, RecorderUnreachableError
 from common.reasons import Reason
 from console.client import GatewayError
@@ -23,8 +23,10 @@ _log = logging.getLogger(__name__)
 
 MOST_COPIES: Final = 64
 """Reported to the gateway."""
+_MOST_PRESENT: Final = 16
+"""Of these, those that run or have failed; they are in every report."""
 _LOOK_S: Final = 30.0
-"""How often the robot's recordings are looked at for the rule."""
+"""How often the robot's recordings are looked at."""
 _PAGE: Final = 200
 _MOST_PAGES: Final = 50
 STATES: Final = {
@@ -36,6 +38,7 @@ STATES: Final = {
     State.PAUSED: recording_pb.RECORDING_COPY_STATE_PAUSED,
     State.FAILED: recording_pb.RECORDING_COPY_STATE_FAILED,
 }
+_PRESENT: Final = RUNNING | {State.FAILED}
 
 
 class Uploading(Protocol):
@@ -48,7 +51,7 @@ class Uploading(Protocol):
         """Returns those that run or wait, in their order."""
 
     def copies(self) -> Sequence[bridge_pb.CopyReport]:
-        """Returns the copies that the recorder is to know; those that run or wait first."""
+        """Returns the copies that the recorder is to know; those that run or have failed first."""
 
     async def enqueue(self, recording_id: str) -> recording_pb.RecordingCopy:
         """Queues a recording; raises a DomainError."""
@@ -119,9 +122,19 @@ class QueuedUploads:
         ]
 
     def copies(self) -> Sequence[bridge_pb.CopyReport]:
-        """Returns the copies that the recorder is to know; those that run or wait first."""
-        known = [*self._uploads.waiting, *self._uploads.settled][:MOST_COPIES]
-        return [bridge_pb.CopyReport(recording_id=each.recording_id, copy=_copy(each)) for each in known]
+        """Returns the copies that the recorder is to know: over some reports, all that it may not have."""
+        uploads = self._uploads
+        waiting = uploads.waiting
+        present = [each for each in waiting if each.state in _PRESENT][:_MOST_PRESENT]
+        turn = map(uploads.get, uploads.unconfirmed.next(MOST_COPIES - len(present)))
+        chosen = {each.recording_id: each for each in (*present, *turn) if each}
+        for each in (*waiting, *uploads.settled):
+            if len(chosen) == MOST_COPIES:
+                break
+            chosen.setdefault(each.recording_id, each)
+        return [
+            bridge_pb.CopyReport(recording_id=each.recording_id, copy=_copy(each)) for each in chosen.values()
+        ]
 
     async def enqueue(self, recording_id: str) -> recording_pb.RecordingCopy:
         """Queues a recording; raises a DomainError."""
@@ -136,15 +149,17 @@ class QueuedUploads:
 
 
 async def apply_rule(uploads: "Uploads", gateway: GatewayCalls) -> None:
-    """Has the rule look at the robot's recordings every 30 s, until cancelled."""
+    """Has the uploads look at the robot's recordings every 30 s, until cancelled."""
     pauses = Pauses()
     while True:
         try:
             token = ""
+            uploads.unconfirmed.begin_listing()
             for _ in range(_MOST_PAGES):
                 page = await gateway.list_recordings(_PAGE, token)
                 await uploads.consider(page.recordings)
                 if not (token := page.next_page_token):
+                    uploads.unconfirmed.end_listing()
                     break
         except GatewayError as error:
             _log.info("the robot's recordings can't be listed: %s", error)

@@ -146,6 +146,7 @@ class _Service:
     queue: str
     handler: Handler
     at_once: int
+    of_one: int
     busy: bytes
     of_people: bool
 
@@ -268,6 +269,14 @@ class Hub:
         ) as deliveries:
             return await anext(deliveries, None)
 
+    async def count(self, stream: str, subjects: str, timeout_s: float = REQUEST_TIMEOUT_S) -> int:
+        """Returns how many messages of a stream have such subjects.
+
+        Raises:
+            HubError: it can't be read.
+        """
+        return await consuming.count(self._open(), stream, subjects, timeout_s)
+
     async def pull(self, stream: str, durable: str, batch: int = 16) -> AsyncGenerator[Delivery, None]:
         """Yields the messages of a durable consumer, over all lost connections. Each needs its `ack`."""
         pause = Backoff(FIRST_PAUSE_S, LONGEST_PAUSE_S)
@@ -318,6 +327,7 @@ class Hub:
         handler: Handler,
         *,
         at_once: int = 8,
+        of_one: int | None = None,
         busy: bytes = b"",
         of_people: bool = False,
     ) -> None:
@@ -332,10 +342,11 @@ class Hub:
             queue: group of programs of which one gets each request.
             handler: answers one; it handles its own errors.
             at_once: requests in hand at any moment.
+            of_one: of these, about one robot; None: all of them.
             busy: answer to requests beyond that.
             of_people: whether they are those of people, who share an account with this program.
         """
-        service = _Service(subject, queue, handler, at_once, busy, of_people)
+        service = _Service(subject, queue, handler, at_once, of_one or at_once, busy, of_people)
         self._services.append(service)
         if self._session is not None:
             await self._serve_in(self._session, service)
@@ -447,20 +458,23 @@ class Hub:
         )
 
     async def _serve_in(self, session: Session, service: _Service) -> None:
-        running: set[asyncio.Task[None]] = set()
+        running: dict[asyncio.Task[None], str] = {}
+        """With the robot."""
 
         async def on_message(message: Message) -> None:
             parts = message.subject.split(".")
             if len(parts) < 3 or not message.reply.startswith(_inboxes(service, parts[1])):
                 return
             request = Request(parts[1], parts[-1], message.payload, session, message.reply)
-            if len(running) >= service.at_once:
+            of_robot = sum(robot == request.robot for robot in running.values())
+            if len(running) >= service.at_once or of_robot >= service.of_one:
                 await request.respond(service.busy)
                 return
             task = asyncio.ensure_future(service.handler(request))
-            for tasks in (running, self._calls):
-                tasks.add(task)
-                task.add_done_callback(tasks.discard)
+            running[task] = request.robot
+            self._calls.add(task)
+            task.add_done_callback(running.pop)
+            task.add_done_callback(self._calls.discard)
 
         await session.subscribe(service.subject, service.queue, on_message)
 

@@ -153,6 +153,17 @@ async def present(
         await _forget(session, stream, consumer)
 
 
+async def count(session: Session, stream: str, subjects: str, timeout_s: float) -> int:
+    """Returns how many messages of a stream have such subjects.
+
+    Raises:
+        HubError: it can't be read.
+    """
+    consumer, pending = await _new_consumer(session, stream, subjects, Start.all(), timeout_s)
+    await _forget(session, stream, consumer)
+    return pending
+
+
 async def _new_consumer(
     session: Session, stream: str, subjects: str, start: Start, timeout_s: float
 ) -> tuple[str, int]:

@@ -3,6 +3,8 @@
 import re
 from typing import Final
 
+LARGEST_MESSAGE: Final = 512 * 1024
+"""Bytes that streams take and credentials permit; a server disconnects a client that sends more."""
 INBOXES: Final = "_INBOX"
 """Prefix of the inboxes of people and programs of the hub, which share it."""
 ROBOT_NAME: Final = re.compile(r"[a-z0-9](?:[a-z0-9-]{0,61}[a-z0-9])?")
@@ -34,6 +36,11 @@ READING_SUBJECTS: Final = "fleet.*.get.*"
 def event_subject(robot: str, run_id: str, first_sequence: int) -> str:
     """Returns the subject of a batch of events."""
     return f"fleet.{robot}.ev.{run_id}.{first_sequence}"
+
+
+def event_subjects(robot: str) -> str:
+    """Returns the subjects of all events of a robot."""
+    return f"fleet.{robot}.ev.>"
 
 
 def command_subject(robot: str, command_id: str) -> str:

@@ -25,6 +25,7 @@ from nats.protocol.parser import PERMISSIONS_ERR, Parser
 from common.deadline import within
 from fleet.errors import HubError, HubReason, RefusedError, UnreachableError, api_error
 from fleet.identity import Credentials
+from fleet.names import LARGEST_MESSAGE
 
 CONNECT_TIMEOUT_S: Final = 5.0
 """For one server: name resolution, TCP, TLS and authentication."""
@@ -387,11 +388,13 @@ class Session:
             raise self.lost.result()
         if not self._client.is_connected:
             raise UnreachableError("the connection to the hub is lost")
+        # The library knows the limit of the server alone, which is a higher one.
+        if len(payload) > LARGEST_MESSAGE:
+            raise _too_large(payload)
         try:
             await self._client.publish(subject, payload, reply, headers)
         except nats_errors.MaxPayloadError as error:
-            text = f"{len(payload)} bytes exceed the hub's limit for one message"
-            raise HubError(HubReason.TOO_LARGE, text) from error
+            raise _too_large(payload) from error
         except (nats_errors.BadSubjectError, nats_errors.BadHeaderError) as error:
             raise HubError(HubReason.INVALID, f"'{subject[:100]}' is no subject") from error
         except (OSError, nats_errors.Error) as error:
@@ -401,6 +404,10 @@ class Session:
         waiter = self._waiters.get(msg.subject.rpartition(".")[2])
         if waiter is not None:
             waiter.take(_message(msg))
+
+
+def _too_large(payload: bytes) -> HubError:
+    return HubError(HubReason.TOO_LARGE, f"{len(payload)} bytes exceed the hub's limit for one message")
 
 
 _BOUNDS: Final[dict[str, Any]] = {

@@ -170,6 +170,55 @@ async def revoke(directory: HubDirectory, kind: Kind, name: str) -> None:
                 await _list_robot(hub, user)
 
 
+@dataclass(frozen=True, slots=True)
+class HubUse:
+    """What the hub's streams have.
+
+    Attributes:
+        streams: how full they are.
+        events: messages with events by robot, the most first; one has up to 64 events.
+    """
+
+    streams: tuple[streams.StreamUse, ...]
+    events: tuple[tuple[str, int], ...]
+
+
+async def usage(directory: HubDirectory) -> HubUse:
+    """Returns how full the streams are, and whose messages are in them.
+
+    Raises:
+        UserError, HubError: the hub can't be reached, or does not say.
+    """
+    robots = [user.name for user in directory.read().users if user.kind == "robot"]
+    async with _connected(directory) as hub:
+        uses = [await streams.use_of(hub, stream) for stream in streams.REPORTED]
+        counts = [(robot, await hub.count(names.EVENTS, names.event_subjects(robot))) for robot in robots]
+    return HubUse(tuple(uses), tuple(sorted(counts, key=lambda each: (-each[1], each[0]))))
+
+
+async def purge(directory: HubDirectory, robot: str, *, recordings: bool) -> dict[str, int]:
+    """Deletes what a robot has put into the streams; neither its state nor its files in the store.
+
+    Args:
+        directory: the hub's.
+        robot: its name.
+        recordings: whether its list of recordings is deleted, too.
+
+    Returns:
+        How many messages were deleted, by stream.
+
+    Raises:
+        UserError, HubError: there is no such robot, or the hub can't be reached or does not do it.
+    """
+    if directory.read().user("robot", robot) is None:
+        raise UserError(f"the hub has no robot '{robot}'", "List them: robot-bridge hub robots")
+    subjects = {names.EVENTS: names.event_subjects(robot), names.RESULTS: names.result_subject(robot, "*")}
+    if recordings:
+        subjects[f"KV_{names.RECORDINGS}"] = f"$KV.{names.RECORDINGS}.{robot}.>"
+    async with _connected(directory) as hub:
+        return {stream: await streams.purge(hub, stream, each) for stream, each in subjects.items()}
+
+
 def operator_login(
     directory: HubDirectory, name: str, *, commands: bool, days: float | None, again: bool
 ) -> str:

@@ -143,6 +143,38 @@ def robots(
 
 
 @app.command()
+def usage(directory: Dir = _DEFAULT_DIR) -> None:
+    """Show how full the streams are, and which robot fills them."""
+    use = _run(administration.usage(HubDirectory(directory)))
+    console = Console(highlight=False, markup=False, emoji=False)
+    table = Table("STREAM", "MIB", "OF", "FULL", box=None)
+    for each in use.streams:
+        table.add_row(
+            each.stream, f"{each.size / _MIB:.1f}", f"{each.most // _MIB}", f"{100 * each.ratio:.0f} %"
+        )
+    console.print(table)
+    table = Table("ROBOT", "MESSAGES WITH EVENTS", box=None)
+    for robot, count in use.events:
+        table.add_row(robot, str(count))
+    console.print(table)
+
+
+@app.command()
+def purge(
+    name: Annotated[str, typer.Argument(help="Of the robot.")],
+    directory: Dir = _DEFAULT_DIR,
+    *,
+    recordings: Annotated[
+        bool, typer.Option("--recordings", help="Its list of recordings, too. The files stay in the store.")
+    ] = False,
+) -> None:
+    """Delete a robot's events and results at the hub, for ever. Revoke it first if its key is stolen."""
+    purged = _run(administration.purge(HubDirectory(directory), name, recordings=recordings))
+    for stream, count in purged.items():
+        typer.echo(f"{stream}: deleted {count} messages of {name}.")
+
+
+@app.command()
 def operator(
     name: Annotated[str, typer.Argument(help="Of the person.")],
     directory: Dir = _DEFAULT_DIR,

@@ -5,8 +5,6 @@ from typing import Final
 from fleet import names
 from fleet.identity import Permissions, Service
 
-_MAX_MESSAGE: Final = 512 * 1024
-"""As the streams' max_msg_size: a batch of events has at most half of it."""
 _READ: Final = (
     names.EVENTS,
     names.RESULTS,
@@ -52,7 +50,7 @@ def robot(name: str) -> Permissions:
         ),
         subscribe=(f"{names.inbox_prefix(name)}.>",),
         subscriptions=16,
-        payload=_MAX_MESSAGE,
+        payload=names.LARGEST_MESSAGE,
     )
 
 
@@ -69,7 +67,7 @@ def operator(*, commands: bool) -> Permissions:
             *((names.COMMAND_SUBJECTS,) if commands else ()),
         ),
         subscribe=("_INBOX.>",),
-        payload=_MAX_MESSAGE,
+        payload=names.LARGEST_MESSAGE,
     )
 
 
@@ -83,7 +81,7 @@ def receiver() -> Permissions:
             *(f"{each} {names.RECEIVERS}" for each in (names.UPLOAD_SUBJECTS, names.READING_SUBJECTS)),
         ),
         respond_s=_ANSWER_S,
-        payload=_MAX_MESSAGE,
+        payload=names.LARGEST_MESSAGE,
     )
 
 

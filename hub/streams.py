@@ -12,6 +12,8 @@ from fleet.errors import HubError, HubReason
 
 _DAY_NS: Final = 86_400 * 1_000_000_000
 _MIB: Final = 1024 * 1024
+_PURGED_WITHIN_S: Final = 60.0
+"""Some millions of messages take seconds."""
 JOINING_S: Final = 30.0
 """How long the nodes of a cluster that has just started may take to find each other."""
 
@@ -68,6 +70,54 @@ async def set_up(hub: Hub, replicas: int, limits: StreamLimits = StreamLimits())
     return differences
 
 
+@dataclass(frozen=True, slots=True)
+class StreamUse:
+    """How full a stream is.
+
+    Attributes:
+        stream: its name.
+        size: bytes on the disk of each node that has it.
+        most: bytes that it may have.
+    """
+
+    stream: str
+    size: int
+    most: int
+
+    @property
+    def ratio(self) -> float:
+        """0: empty, 1: full."""
+        return self.size / self.most if self.most > 0 else 0.0
+
+
+REPORTED: Final = (names.EVENTS, names.RESULTS, f"KV_{names.RECORDINGS}")
+"""Streams that robots fill, each in proportion to what it sends. When one is full, no robot can add to it."""
+
+
+async def use_of(hub: Hub, stream: str) -> StreamUse:
+    """Returns how full a stream is.
+
+    Raises:
+        HubError: the hub does not say.
+    """
+    info = await hub.api(f"STREAM.INFO.{stream}")
+    try:
+        return StreamUse(stream, int(info["state"]["bytes"]), int(info["config"]["max_bytes"]))
+    except (KeyError, TypeError, ValueError) as error:
+        raise HubError(HubReason.INVALID, f"the hub's answer about {stream} makes no sense") from error
+
+
+async def purge(hub: Hub, stream: str, subjects: str) -> int:
+    """Deletes the messages of a stream with such subjects; returns how many there were.
+
+    Raises:
+        HubError: the hub does not do it.
+    """
+    answer = await hub.api(f"STREAM.PURGE.{stream}", {"filter": subjects}, _PURGED_WITHIN_S)
+    purged = answer.get("purged", 0)
+    return purged if isinstance(purged, int) else 0
+
+
 async def add_command_consumer(hub: Hub, robot: str) -> None:
     """Makes the durable consumer through which a robot reads its commands, if it does not exist.
 
@@ -121,11 +171,10 @@ def _stream(subjects: str, max_bytes: int, max_age_ns: int, more: Mapping[str, A
         "storage": "file",
         "max_bytes": max_bytes,
         "max_age": max_age_ns,
-        "max_msg_size": 512 * 1024,
+        "max_msg_size": names.LARGEST_MESSAGE,
         # Repeats are recognised by their subject, without a window of time.
         "duplicate_window": 1_000_000_000,
         "deny_delete": True,
-        "deny_purge": True,
         **more,
     }
 
@@ -138,12 +187,11 @@ def _bucket(name: str, max_bytes: int) -> dict[str, Any]:
         "storage": "file",
         "max_msgs_per_subject": 1,
         "max_bytes": max_bytes,
-        "max_msg_size": 512 * 1024,
+        "max_msg_size": names.LARGEST_MESSAGE,
         "discard": "new",
         # A robot's "Nats-Rollup: all" would delete the values of all others.
         "allow_rollup_hdrs": False,
         "deny_delete": True,
-        "deny_purge": True,
         "duplicate_window": 1_000_000_000,
     }
 

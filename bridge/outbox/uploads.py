@@ -51,7 +51,8 @@ class StoredUploads:
 
 def _row(upload: Upload) -> str:
     values: dict[str, Any] = asdict(upload)
-    del values["due_s"]  # Of this run's clock.
+    # Of this run alone.
+    del values["due_s"], values["cuts"]
     values |= {
         "priority": upload.priority.name,
         "state": upload.state.name,

@@ -8,7 +8,7 @@ from bridge.pauses import Pauses
 from bridge.robot.gateway import STATUS_SILENT_S, explained, statuses
 from common.broadcast import Broadcast
 from common.errors import UserError
-from omniseer.gateway.v1.system_status_pb2 import SystemStatus  # noqa: TC001
+from omniseer.gateway.v1.system_status_pb2 import SystemStatus
 
 _log = logging.getLogger(__name__)
 
@@ -34,6 +34,11 @@ class StatusReader:
         self.reachable = False
         self.error = ""
         self.changes = Broadcast()
+
+    @property
+    def current(self) -> SystemStatus | None:
+        """The newest one while the gateway is reached; None without it: what was so may have changed."""
+        return self.newest if self.reachable else None
 
     async def run(self) -> None:
         """Reads; tries again for as long as it takes."""

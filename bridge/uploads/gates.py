@@ -29,12 +29,22 @@ def closed(settings: UploadSettings, conditions: Conditions) -> str:
     return next(filter(None, (gate(settings, conditions) for gate in _GATES)), "")
 
 
-def _interface(settings: UploadSettings, conditions: Conditions) -> str:
-    allowed, name = settings.interfaces, conditions.interface
+def wrong_interface(settings: UploadSettings, name: str) -> str:
+    """Returns why nothing may be sent through an interface; empty if it may.
+
+    Args:
+        settings: Which ones are allowed.
+        name: Of the interface; empty if it is not known.
+    """
+    allowed = settings.interfaces
     if not allowed or any(fnmatchcase(name, pattern) for pattern in allowed):
         return ""
     through = f"the store is reached through {name}" if name else "the route to the store is not known"
     return f"{through}; uploads are allowed through {', '.join(allowed)}"
+
+
+def _interface(settings: UploadSettings, conditions: Conditions) -> str:
+    return wrong_interface(settings, conditions.interface)
 
 
 def _hours(settings: UploadSettings, conditions: Conditions) -> str:

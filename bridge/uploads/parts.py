@@ -10,23 +10,31 @@ network. What the store answers is read up to a bound, and nothing of it is trus
 | 404 | `LostError`: the store does not know the multipart upload any more; the file is begun again |
 | 507, or a code that says so | the store has no room: `CutError`, as for all that follows |
 | another status, or a redirect | with the status and the store's code |
+| the way to the store leads through an interface that is not allowed | no connection is made |
 | no connection within 10 s, no progress for 60 s, cut | with what the connection reports |
 """
 
 import asyncio
+import errno
 import re
+import socket
 import ssl
 from collections.abc import AsyncGenerator, AsyncIterator, Callable
-from typing import Final, Self
+from typing import TYPE_CHECKING, Final, Self
 from urllib.parse import SplitResult, urlsplit
 
 import aiohttp
 from yarl import URL
 
 from bridge.uploads.config import UploadSettings
+from bridge.uploads.gates import wrong_interface
 from bridge.uploads.problems import CutError
+from bridge.uploads.route import interface_of
 from common.errors import UserError
 from common.pace import Pace
+
+if TYPE_CHECKING:
+    from aiohappyeyeballs import AddrInfoType
 
 _CONNECT_S: Final = 10.0
 _SILENT_S: Final = 60.0
@@ -61,13 +69,15 @@ class PartSender:
         self._settings = settings
         self._pace = Pace(settings.max_bytes_per_s)
         self._session = aiohttp.ClientSession(
-            connector=aiohttp.TCPConnector(ssl=_tls(settings), limit=2),
+            connector=aiohttp.TCPConnector(ssl=_tls(settings), limit=2, socket_factory=self._socket),
             timeout=aiohttp.ClientTimeout(total=_WHOLE_S, sock_connect=_CONNECT_S, sock_read=_SILENT_S),
             cookie_jar=aiohttp.DummyCookieJar(),
             # Neither proxies nor passwords from the environment: the hosts above are all there is.
             trust_env=False,
             auto_decompress=False,
         )
+        self.host = ""
+        """Of the store's, HOST or HOST:PORT: where the last part went; empty before the first."""
         self.sent_bytes = 0
         """Handed to connections since the start, those that were sent twice included."""
 
@@ -89,6 +99,7 @@ class PartSender:
             ExpiredError, LostError, CutError: See the table.
         """
         checked = checked_url(url, self._settings)
+        self.host = checked.authority
         loop = asyncio.get_running_loop()
         try:
             async with asyncio.timeout(_SILENT_S) as silence:
@@ -104,8 +115,21 @@ class PartSender:
                 ) as answer:
                     return await _etag(answer)
         except (aiohttp.ClientError, OSError, TimeoutError) as error:
-            text = str(error) or "no progress for a minute"
+            text = _text(error) or "no progress for a minute"
             raise CutError(f"the store at {checked.host} can't be reached: {text[:200]}") from error
+
+    def _socket(self, address: "AddrInfoType") -> socket.socket:
+        """Returns the socket for a connection to an address, the very one that is connected to.
+
+        Raises:
+            OSError: There is no route to it, or it leads through an interface that is not allowed.
+        """
+        family, kind, protocol, _, where = address
+        if self._settings.interfaces and (
+            why := wrong_interface(self._settings, interface_of(str(where[0])))
+        ):
+            raise OSError(errno.EHOSTUNREACH, why)
+        return socket.socket(family, kind, protocol)
 
     async def _paced(self, body: AsyncIterator[bytes], moved: Callable[[], None]) -> AsyncGenerator[bytes]:
         loop = asyncio.get_running_loop()
@@ -146,6 +170,13 @@ def _host_of(parts: SplitResult) -> str:
     """Returns HOST, or HOST:PORT where the port is named."""
     host = parts.hostname or ""
     return host if parts.port is None else f"{host}:{parts.port}"
+
+
+def _text(error: Exception) -> str:
+    """Returns what an error says; of several addresses, what that of each said."""
+    if isinstance(error, aiohttp.ClientConnectorError) and error.os_error.strerror is None:
+        return str(error.os_error)
+    return str(error)
 
 
 async def _etag(answer: aiohttp.ClientResponse) -> str:

@@ -21,6 +21,8 @@ MOST_KEPT: Final = 10_000
 """Recordings of which it is remembered that they are verified; the oldest are forgotten first."""
 FIRST_PAUSE_S: Final = 1.0
 LONGEST_PAUSE_S: Final = 300.0
+MOST_CUTS: Final = 3
+"""In succession and without progress: from then on a recording counts as the one that fails."""
 
 
 class State(Enum):
@@ -59,7 +61,7 @@ class Event(Enum):
     FAILURE = "failure"
     """Of this recording; it alone is tried again later."""
     CUT = "cut"
-    """The gateway, the hub or the store fails, and with it all of the queue."""
+    """The gateway, the hub or the store fails, and with it all of the queue; or only at this recording."""
     RESTART = "restart"
     """The bridge was started again."""
     CHANGED = "changed"
@@ -159,6 +161,7 @@ class Upload:
         reason: Why it rests or has failed, for people. Otherwise empty.
         bytes_done: Bytes that the store has.
         failures: FAILURE events in succession.
+        cuts: CUT events in succession, without progress; not kept over a restart.
         due_s: When a failed one is tried again; monotonic seconds, and so not kept over a restart.
     """
 
@@ -172,6 +175,7 @@ class Upload:
     reason: str = ""
     bytes_done: int = 0
     failures: int = 0
+    cuts: int = 0
     due_s: float = 0.0
 
     @property
@@ -223,15 +227,30 @@ def step(upload: Upload, event: Event, now_s: float, reason: str = "") -> Upload
     changed = replace(upload, state=state)
     match event:
         case Event.FAILURE:
-            failures = upload.failures + 1
-            changed = replace(changed, reason=reason, failures=failures, due_s=now_s + pause_s(failures))
-        case Event.PAUSE | Event.CUT:
+            changed = _failed(changed, reason, now_s)
+        case Event.CUT:
+            changed = replace(changed, reason=reason, cuts=upload.cuts + 1)
+            if changed.cuts >= MOST_CUTS:
+                changed = _failed(changed, reason, now_s)
+        case Event.PAUSE:
             changed = replace(changed, reason=reason)
         case Event.CONFIRMED:
-            changed = replace(changed, reason="", bytes_done=upload.size, failures=0, due_s=0.0)
+            changed = replace(changed, reason="", bytes_done=upload.size, failures=0, cuts=0, due_s=0.0)
         case _ if state is not upload.state:
             changed = replace(changed, reason="", due_s=0.0)
     return changed
+
+
+def progressed(upload: Upload, bytes_done: int) -> Upload:
+    """Returns the upload once the store has so many bytes."""
+    done = min(bytes_done, upload.size)
+    return replace(upload, bytes_done=done, cuts=0 if done > upload.bytes_done else upload.cuts)
+
+
+def _failed(upload: Upload, reason: str, now_s: float) -> Upload:
+    """Returns the upload after a failure of this recording."""
+    failures = upload.failures + 1
+    return replace(upload, reason=reason, failures=failures, due_s=now_s + pause_s(failures))
 
 
 def pause_s(failures: int) -> float:
@@ -240,14 +259,21 @@ def pause_s(failures: int) -> float:
     return float(min(LONGEST_PAUSE_S, FIRST_PAUSE_S * 2 ** min(failures - 1, 16)))
 
 
-def next_upload(uploads: Iterable[Upload], now_s: float) -> Upload | None:
-    """Returns the one to upload now; None where none waits, or those that do have just failed."""
+def next_upload(uploads: Iterable[Upload], now_s: float, *, path_works: bool = True) -> Upload | None:
+    """Returns the one to upload now; None where none waits, or those that do have just failed.
+
+    Args:
+        uploads: All of them.
+        now_s: Monotonic seconds.
+        path_works: Whether the last attempt was not cut. If it was, those that were cut again and again go
+            last: what fails may be they.
+    """
     due = (
         each
         for each in uploads
         if each.state in WAITING and (each.state is not State.FAILED or each.due_s <= now_s)
     )
-    return min(due, key=lambda each: each.order, default=None)
+    return min(due, key=lambda each: (not path_works and each.cuts >= MOST_CUTS, each.order), default=None)
 
 
 def in_order(uploads: Iterable[Upload]) -> list[Upload]:

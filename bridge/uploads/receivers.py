@@ -13,7 +13,7 @@ from typing import Any, Final, Protocol, cast
 from google.protobuf.message import DecodeError, Message
 
 from bridge.uploads.parts import LostError
-from bridge.uploads.problems import CutError, RecordingError
+from bridge.uploads.problems import AttemptError, CutError, RecordingError
 from console.printable import printable
 from fleet.errors import HubError, HubReason
 from fleet.names import upload_subject
@@ -37,8 +37,6 @@ _ASKED: Final = 3
 _SHORTEST_READING_S: Final = 120.0
 _SLOWEST_BYTES_PER_S: Final = 1024 * 1024
 """Of a receiver that reads a file."""
-_NAMES_BYTES: Final = 512 * 1024
-"""Of all file names in one request; a message of the hub has at most 1 MiB."""
 
 
 class Requests(Protocol):
@@ -117,8 +115,6 @@ class Receivers:
 
     async def complete_upload(self, recording: Recording, names: Sequence[str]) -> pb.SignedReceipt:
         """Has the receipt of the whole recording made; it is still to be checked."""
-        if sum(len(name.encode()) + 4 for name in names) > _NAMES_BYTES:
-            raise RecordingError("its files' names are too long for one message")
         request = pb.CompleteUploadRequest(recording=recording, file_names=names)
         limit_s = _SHORTEST_READING_S + len(names)
         return await self._receipt("complete_upload", request, lambda answer: answer.files_done, limit_s)
@@ -209,7 +205,9 @@ _REFUSALS: Final[Mapping[int, tuple[type[Exception], str]]] = {
 }
 
 
-def _hub_problem(error: HubError) -> CutError:
+def _hub_problem(error: HubError) -> AttemptError:
+    if error.reason is HubReason.TOO_LARGE:
+        return RecordingError("its description with the names of its files is too large for the hub")
     if error.reason is HubReason.NO_RESPONDERS:
         return CutError("no receiver of recordings runs at the hub")
     return CutError(f"the hub can't be reached: {printable(str(error))[:200]}")

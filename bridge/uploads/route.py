@@ -49,11 +49,11 @@ async def interface_to(host: str) -> str:
     for *_, address in found:
         # The one that is connected to first; one without a route is passed over.
         with suppress(OSError):
-            return _interface(str(address[0]))
+            return interface_of(str(address[0]))
     return ""
 
 
-def _interface(address: str) -> str:
+def interface_of(address: str) -> str:
     """Returns the interface of the route to an address.
 
     Raises:

@@ -6,8 +6,10 @@
 | a more urgent recording is queued | it takes the place of the one that is uploaded |
 | an attempt fails because of this recording | FAILED; again after 1, 2, 4 ... 300 s; others go on |
 | gateway, hub or store fail | FAILED; all wait 1, 2, 4 ... 300 s, and from 1 s again after progress |
+| they fail three times at one recording, without progress | as a failure of that one: others go on |
 | the recording is deleted on the robot | it leaves the queue |
 | the bridge's disk fails | the queue goes on in memory; `disk_error` says why; a new request is refused |
+| the queue on the disk is lost | what the recorder expects to be copied is queued again |
 """
 
 import asyncio
@@ -37,10 +39,12 @@ from bridge.uploads.queue import (
     UploadStore,
     in_order,
     next_upload,
+    progressed,
     step,
 )
 from bridge.uploads.receivers import Receivers, Requests
 from bridge.uploads.route import interface_to
+from bridge.uploads.unconfirmed import Unconfirmed
 from common.backoff import Backoff
 from common.errors import NotFoundError, PreconditionError, TooMuchError
 from common.reasons import Reason
@@ -53,6 +57,17 @@ _TICK_S: Final = 1.0
 """How often the gates are looked at."""
 _RATE_TICKS: Final = 5
 """Over how many the rate is measured."""
+
+_STATES: Final = {
+    State.LOCAL: results.RecordingCopyState.UNKNOWN,
+    State.QUEUED: results.RecordingCopyState.QUEUED,
+    State.UPLOADING: results.RecordingCopyState.UPLOADING,
+    State.VERIFYING: results.RecordingCopyState.VERIFYING,
+    State.VERIFIED: results.RecordingCopyState.VERIFIED,
+    State.PAUSED: results.RecordingCopyState.PAUSED,
+    State.FAILED: results.RecordingCopyState.FAILED,
+}
+"""As the recorder keeps them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,14 +115,18 @@ class Uploads:
         self._wake = asyncio.Event()
         self._path = Backoff(FIRST_PAUSE_S, LONGEST_PAUSE_S)
         self._path_due_s = 0.0
+        self._load_pause = Backoff(FIRST_PAUSE_S, LONGEST_PAUSE_S)
+        self._load_due_s = 0.0
         self._running: tuple[str, asyncio.Task[None]] | None = None
         self._ending = set[asyncio.Task[None]]()
         """Attempts that were cancelled and still close their connections."""
         self._disk = asyncio.Lock()
         self._sender: PartSender | None = None
         self._sent = deque[tuple[float, int]](maxlen=_RATE_TICKS)
+        self.unconfirmed = Unconfirmed()
+        """Those that the recorder may not have as they are."""
         self.loaded = asyncio.Event()
-        """Set once the queue has been read from the disk."""
+        """Set once the queue has been read from the disk, or that has failed."""
         self.paused = ""
         """Why nothing is uploaded although something waits, for people. Otherwise empty."""
         self.disk_error = ""
@@ -124,6 +143,10 @@ class Uploads:
     def settled(self) -> list[Upload]:
         """Those that are verified, or were taken from the queue; the newest first."""
         return [each for each in reversed(self._uploads.values()) if each.state not in WAITING]
+
+    def get(self, recording_id: str) -> Upload | None:
+        """Returns the upload of a recording, in whatever state; None if there is none."""
+        return self._uploads.get(recording_id)
 
     @property
     def current(self) -> Upload | None:
@@ -195,16 +218,25 @@ class Uploads:
         return upload
 
     async def consider(self, recordings: Iterable[results.Recording]) -> None:
-        """Queues those of some recordings that the rule selects, and that have ended."""
+        """Takes recordings of the recorder's list, and queues those that have ended and are to be copied.
+
+        Those are what the rule selects, and what the recorder expects to be copied although it is not in the
+        queue: that was lost with the bridge's disk.
+        """
         await self.loaded.wait()
+        room = self._room
         for recording in sorted(recordings, key=lambda each: each.started_unix_ms):
             known = self._uploads.get(recording.id)
-            if not ended(recording) or not _selects(self._settings.rule, recording):
+            if known:
+                self.unconfirmed.listed(recording.id, confirmed=_is_known(known, recording.copy))
+            if not ended(recording):
                 continue
-            if known is None and recording.copy.state is not results.RecordingCopyState.VERIFIED:
-                if self._has_room_for(recording.id):
-                    await self._keep(step(_new(recording), Event.ENQUEUE, self._now_s))
-            elif known and known.state is State.VERIFIED and _differs(known, recording):
+            selected = _selects(self._settings.rule, recording)
+            if known is None and _is_wanted(recording, selected=selected) and room > 0:
+                lowest = Priority.OTHER if selected else Priority.BY_HAND
+                await self._keep(step(_new(recording, lowest), Event.ENQUEUE, self._now_s))
+                room = self._room
+            elif known and selected and known.state is State.VERIFIED and _differs(known, recording):
                 await self._keep(step(known, Event.CHANGED, self._now_s))
         self._wake.set()
 
@@ -219,8 +251,9 @@ class Uploads:
         try:
             async with PartSender(self._settings) as sender:
                 self._sender = sender
-                await self._load()
                 while not stop.is_set():
+                    if self._now_s >= self._load_due_s:
+                        await self._load()
                     await self._tick()
                     await self._next_tick()
         finally:
@@ -230,13 +263,22 @@ class Uploads:
             await asyncio.gather(*self._ending, return_exceptions=True)
 
     async def _load(self) -> None:
+        """Reads the queue from the disk, once; where that fails, again later.
+
+        What has happened to a recording meanwhile counts.
+        """
         try:
             rows = await self._store.uploads()
         except OSError as error:
             self._note_disk(error)
-            rows = []
-        for upload in rows:
-            self._uploads[upload.recording_id] = step(upload, Event.RESTART, self._now_s)
+            self._load_due_s = self._now_s + self._load_pause.next_s()
+        else:
+            for upload in rows:
+                self._uploads.setdefault(upload.recording_id, step(upload, Event.RESTART, self._now_s))
+            for upload in reversed(self.waiting):
+                self.unconfirmed.changed(upload.recording_id)
+            self.disk_error = ""
+            self._load_due_s = float("inf")
         self.loaded.set()
 
     async def _next_tick(self) -> None:
@@ -260,7 +302,8 @@ class Uploads:
             for each in self.waiting:
                 if each.state is State.PAUSED:
                     await self._apply(each.recording_id, Event.RESUME)
-        head = next_upload(self._uploads.values(), self._now_s)
+        path_works = not self._path.failures
+        head = next_upload(self._uploads.values(), self._now_s, path_works=path_works)
         if closed:
             await self._pause(head, closed)
         elif head:
@@ -306,7 +349,7 @@ class Uploads:
             upload = self._uploads[recording_id]
             if done > upload.bytes_done:
                 self._path.reset()
-            self._put(replace(upload, bytes_done=min(done, upload.size)))
+            self._put(progressed(upload, done))
 
         def sent() -> None:
             self._put(step(self._uploads[recording_id], Event.SENT, self._now_s))
@@ -352,9 +395,15 @@ class Uploads:
     async def _closed(self) -> str:
         if not self._settings.store_hosts:
             return "no store is configured: set uploads.store_hosts to HOST:PORT of the fleet's store"
-        interface = await interface_to(self._settings.store_hosts[0]) if self._settings.interfaces else ""
+        interface = await self._interface() if self._settings.interfaces else ""
         now = datetime.now().astimezone().time()
         return gates.closed(self._settings, Conditions(interface, now, self._charging()))
+
+    async def _interface(self) -> str:
+        """Returns the interface to the host that is sent to; while none is, an allowed one to any of them."""
+        sending = self._sender.host if self._sender and self._running else ""
+        found = [await interface_to(host) for host in ([sending] if sending else self._settings.store_hosts)]
+        return next((name for name in found if not gates.wrong_interface(self._settings, name)), found[0])
 
     async def _look_up(self, recording_id: str) -> results.Recording:
         try:
@@ -404,6 +453,7 @@ class Uploads:
 
     def _drop(self, recording_id: str) -> None:
         self._uploads.pop(recording_id, None)
+        self.unconfirmed.removed(recording_id)
         self._changed()
 
     def _put(self, upload: Upload) -> None:
@@ -412,6 +462,8 @@ class Uploads:
             # In the order of their changes.
             del self._uploads[upload.recording_id]
         self._uploads[upload.recording_id] = upload
+        if before is None or (before.state, before.reason) != (upload.state, upload.reason):
+            self.unconfirmed.changed(upload.recording_id)
         self._changed()
 
     def _note_disk(self, error: OSError) -> None:
@@ -424,7 +476,12 @@ class Uploads:
 
     def _has_room_for(self, recording_id: str) -> bool:
         known = self._uploads.get(recording_id)
-        return (known is not None and known.state in WAITING) or len(self.waiting) < MOST_WAITING
+        return (known is not None and known.state in WAITING) or self._room > 0
+
+    @property
+    def _room(self) -> int:
+        """How many more may wait."""
+        return MOST_WAITING - sum(each.state in WAITING for each in self._uploads.values())
 
     @property
     def _now_s(self) -> float:
@@ -445,6 +502,22 @@ def _new(recording: results.Recording, lowest: Priority = Priority.OTHER) -> Upl
         started_unix_ms=recording.started_unix_ms,
         size=recording.size,
     )
+
+
+def _is_wanted(recording: results.Recording, *, selected: bool) -> bool:
+    """Returns whether a recording that the queue does not have is to be copied."""
+    match recording.copy.state:
+        case results.RecordingCopyState.VERIFIED:
+            return False
+        case results.RecordingCopyState.UNKNOWN:
+            return selected
+        case _:
+            return True
+
+
+def _is_known(upload: Upload, copy: results.RecordingCopy) -> bool:
+    """Returns whether the recorder has an upload as it is, but for its bytes, which change all the time."""
+    return (copy.state, copy.reason) == (_STATES[upload.state], upload.reason)
 
 
 def _differs(upload: Upload, recording: results.Recording) -> bool:

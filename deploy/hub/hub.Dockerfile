@@ -31,6 +31,7 @@ COPY practice practice
 COPY preview preview
 COPY recorder recorder
 COPY simrobot simrobot
+COPY tap tap
 COPY proto/python proto/python
 RUN .cache/tools/bin/python -m hatchling build -t wheel \
  && .cache/tools/bin/uv pip install --quiet --offline --no-deps --compile-bytecode --python .venv/bin/python dist/*.whl \

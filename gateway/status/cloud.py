@@ -118,7 +118,7 @@ class BridgeReport:
     """The state of the bridge at one instant; see bridge_service.proto.
 
     Attributes:
-        copies: those that wait, run or have ended last; each recording once.
+        copies: some of those that the recorder is to know; each recording once, others in other reports.
         requests: of the hub, the oldest first.
     """
 

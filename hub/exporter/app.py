@@ -14,9 +14,11 @@ from fleet.connection import FleetAddress, Hub, connect
 from fleet.errors import HubError
 from fleet.names import ROBOTS, STATES
 from hub.exporter.collector import FleetCollector
+from hub.streams import REPORTED, use_of
 
 _MS_PER_S: Final = 1000
 _CLOCK_AGAIN_AFTER_S: Final = 60.0
+_STREAMS_EVERY_S: Final = 30.0
 _FIRST_CLOCK_WITHIN_S: Final = 2.0
 """Without an answer it is tried again so soon: until then, this computer's clock counts."""
 
@@ -39,6 +41,7 @@ class FleetExporter:
             tasks.create_task(self._robots())
             tasks.create_task(self._states())
             tasks.create_task(self._keep_time())
+            tasks.create_task(self._look_at_streams())
 
     def _now_unix_ms(self) -> int:
         # The clock is read again and again.
@@ -52,6 +55,14 @@ class FleetExporter:
         async for entry in self._hub.watch_bucket(STATES):
             received = round(entry.unix_s * _MS_PER_S)
             self.collector.take_state(entry.key, entry.value, received, deleted=entry.deleted)
+
+    async def _look_at_streams(self) -> None:
+        while True:
+            await self._hub.connected()
+            with suppress(HubError):
+                for stream in REPORTED:
+                    self.collector.take_use(await use_of(self._hub, stream))
+            await asyncio.sleep(_STREAMS_EVERY_S)
 
     async def _keep_time(self) -> None:
         while True:

@@ -3,7 +3,7 @@
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -16,6 +16,7 @@ from fleet.enrolment import is_revoked
 from fleet.names import ROBOT_NAME
 from fleet.reading import NotReadableError, robot_state
 from fleet.standing import Evidence, Standing, standing
+from hub.streams import StreamUse
 from omniseer.fleet.v1.state_pb2 import RobotState
 from omniseer.gateway.v1 import fault_pb2, value_pb2
 
@@ -83,6 +84,7 @@ class FleetCollector(InstantCollector):
     connected: Callable[[], bool]
     _enrolled: dict[str, bool] = field(default_factory=dict)
     _states: dict[str, SeenState] = field(default_factory=dict)
+    _uses: dict[str, StreamUse] = field(default_factory=dict)
     _series: dict[str, set[tuple[str, ...]]] = field(default_factory=dict)
 
     def take_robot(self, name: str, entry: bytes, *, deleted: bool) -> None:
@@ -100,10 +102,15 @@ class FleetCollector(InstantCollector):
         elif name in self._states or len(self._states) < MOST_ROBOTS:
             self._states[name] = SeenState(_state(name, value), received_unix_ms)
 
+    def take_use(self, use: StreamUse) -> None:
+        """Takes how full a stream is."""
+        self._uses[use.stream] = use
+
     def collect(self) -> Iterator[Metric]:
         """Yields every family."""
         robots = [self._sample(name) for name in sorted(self._enrolled)]
         yield Gauge(f"{_PREFIX}_hub_connected", "1 while the hub answers.", value=self.connected())
+        yield _uses(self._uses.values())
         yield _standings(robots)
         current = [robot for robot in robots if robot.standing is not Standing.REVOKED]
         up = {robot.name: float(robot.standing is Standing.UP) for robot in current}
@@ -179,6 +186,15 @@ class FleetCollector(InstantCollector):
             gateway_reachable=state is not None and state.gateway_reachable,
         )
         return RobotSample(name, standing(evidence), age_s, state)
+
+
+def _uses(uses: Iterable[StreamUse]) -> Metric:
+    family = Gauge(
+        f"{_PREFIX}_stream_used_ratio", "How full a stream is: 1 takes nothing more.", labels=("stream",)
+    )
+    for each in uses:
+        family.add_metric((each.stream,), each.ratio)
+    return family
 
 
 def _standings(robots: list[RobotSample]) -> Metric:

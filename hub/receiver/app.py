@@ -6,6 +6,7 @@ from collections.abc import AsyncIterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, nullcontext
 from datetime import UTC, datetime, timedelta
+from itertools import islice
 from typing import Final
 
 from common import bind, rpc
@@ -28,8 +29,12 @@ SERVICE: Final = "receiver"
 """Of the health service: whether the receiver is connected to the hub."""
 AT_ONCE: Final = 8
 """Requests in hand; further ones get BUSY."""
+OF_ONE: Final = 4
+"""Of these, of one robot, which uploads one file at a time: the others are served whatever it does."""
 _SWEEP_EVERY_S: Final = 3600.0
 _MOST_SWEPT: Final = 1000
+_MOST_LOOKED_AT: Final = 100_000
+"""Uploads that run; the store lists them 1000 at a time."""
 _NAMES: Final = frozenset(field.name for field in UploadResponse.DESCRIPTOR.fields) - {"error"}
 
 
@@ -60,7 +65,13 @@ async def serve(settings: ReceiverSettings, stop: asyncio.Event) -> None:
                 for subjects, of_people in ((UPLOAD_SUBJECTS, False), (READING_SUBJECTS, True)):
                     handler = _handler(service, metrics, of_people=of_people)
                     await hub.serve(
-                        subjects, RECEIVERS, handler, at_once=AT_ONCE, busy=busy(), of_people=of_people
+                        subjects,
+                        RECEIVERS,
+                        handler,
+                        at_once=AT_ONCE,
+                        of_one=OF_ONE,
+                        busy=busy(),
+                        of_people=of_people,
                     )
                 _log.info("receiving recordings of the fleet %s", settings.fleet)
                 await first_to_end(
@@ -142,7 +153,8 @@ def sweep(store: Store, prefix: str, before: datetime) -> int:
     Raises:
         StoreError: The store does not answer.
     """
-    old = [each for each in store.open_uploads(prefix, _MOST_SWEPT) if each.begun < before]
+    found = islice(store.open_uploads(prefix), _MOST_LOOKED_AT)
+    old = list(islice((each for each in found if each.begun < before), _MOST_SWEPT))
     for upload in old:
         store.abort(upload)
     return len(old)

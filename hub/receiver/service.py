@@ -8,6 +8,8 @@ Remembers nothing: any receiver may answer the next request.
 | a robot asks for other content of a file that is verified | INVALID: what is verified is never overwritten |
 | the bytes in the store are wrong | the object is deleted: WRONG_CONTENT, and the robot sends it again |
 | the object changes while it is read | nothing is deleted or signed: STORE, and the robot asks again |
+| a receiver stalls, and another one goes on | what it does then has the condition that nothing has changed |
+| a verified file is not in the store any more | its receipt counts no more, and the robot sends it again |
 | the store is full, refuses or does not answer | NO_ROOM or STORE, with the reason in words |
 | the receiver ends while it reads | the robot asks again after 10 s, and another receiver answers |
 | a name that could lead out of the recording's folder | INVALID |
@@ -19,14 +21,15 @@ import hashlib
 import logging
 import threading
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, Final, ParamSpec, Protocol, TypeVar
 
 from google.protobuf.message import DecodeError, Message
 
-from fleet.names import RECORDINGS
+from fleet.errors import HubError, HubReason
+from fleet.names import LARGEST_MESSAGE, RECORDINGS
 from fleet.receipt_keys import ReceiptError, ReceiptSigner, confirmed, digest_of
 from hub.receiver.keys import BadNameError, RecordingKeys, checked
 from hub.receiver.store import PART_BYTES, URL_VALID_S, Store, StoredObject, StoreError, StoreProblem
@@ -47,8 +50,8 @@ _LONGEST_ID: Final = 2048
 _LONGEST_ETAG: Final = 128
 _RECEIPT_BYTES: Final = 8192
 _RECORD_BYTES: Final = 4 * 1024 * 1024
-_MOST_IN_RECORD: Final = 768 * 1024
-"""Of a StoredRecording in the bucket: a message of the hub has at most 1 MiB."""
+_MOST_IN_RECORD: Final = LARGEST_MESSAGE
+"""Of a StoredRecording in the bucket, in bytes; a larger one is listed without its files."""
 _SHORTEST_S: Final = 600.0
 _SLOWEST_BYTES_PER_S: Final = 1024 * 1024
 _AT_ONCE: Final = 8
@@ -145,6 +148,8 @@ class ReceiverService:
         async def send_part(part: Message) -> None:
             response: Any = pb.UploadResponse()
             getattr(response, name).CopyFrom(part)
+            if response.ByteSize() > LARGEST_MESSAGE:
+                raise Refusal(pb.UPLOAD_ERROR_CODE_INVALID, "the answer is too large for the hub")
             await send(response)
 
         try:
@@ -172,7 +177,11 @@ class ReceiverService:
         keys = self._keys(robot, recording.id)
         if content := await self._call(self._store.read, keys.recording, _RECORD_BYTES):
             stored = _parsed(pb.StoredRecording, content)
-            if stored and self._counts(stored.receipt, self._receipt_of(robot, recording)):
+            if (
+                stored
+                and self._counts(stored.receipt, self._receipt_of(robot, recording))
+                and not await self._missing(keys, stored.files)
+            ):
                 # The bucket may have lost it.
                 await self._list(robot, stored)
                 return pb.BeginUploadResponse(receipt=stored.receipt)
@@ -185,7 +194,7 @@ class ReceiverService:
             return pb.BeginFileResponse(receipt=receipt)
         found = await self._call(self._store.find, keys.file(file.name))
         if file.size == 0:
-            await self._call(self._store.write, keys.file(file.name), b"")
+            await self._call(self._store.create, keys.file(file.name))
         if file.size == 0 or (found and found.size == file.size):
             return pb.BeginFileResponse(part_size=PART_BYTES)
         upload_id = await self._call(self._store.open_upload, keys.file(file.name))
@@ -244,14 +253,14 @@ class ReceiverService:
         ):
             raise Refusal(pb.UPLOAD_ERROR_CODE_INVALID, "the parts are not those of one file, in order")
         _check_upload_id(request.upload_id)
-        if await self._call(self._store.read, keys.receipt(request.file_name), _RECEIPT_BYTES):
-            # Completed before, and verified since.
-            return pb.CompleteFileResponse()
-        try:
-            await self._call(self._store.complete, key, request.upload_id, parts)
-        except StoreError as error:
-            if error.problem is not StoreProblem.MISSING or not await self._call(self._store.find, key):
-                raise
+        # What is there was completed before, and may be verified since: only a look at its bytes replaces it.
+        if not await self._call(self._store.find, key):
+            try:
+                await self._call(self._store.complete, key, request.upload_id, parts)
+            except StoreError as error:
+                repeated = error.problem in {StoreProblem.MISSING, StoreProblem.CHANGED}
+                if not repeated or not await self._call(self._store.find, key):
+                    raise
         return pb.CompleteFileResponse()
 
     async def _verify_file(self, robot: str, request: pb.VerifyFileRequest, send: _Send) -> Message:
@@ -268,6 +277,9 @@ class ReceiverService:
         expected = self._receipt_of(robot, Recording(id=request.recording_id), file)
         receipt = self._sign(expected, self._store.location(key))
         await self._call(self._store.write, keys.receipt(file.name), receipt.SerializeToString())
+        if await self._call(self._store.find, key) != found:
+            await self._forget(keys.receipt(file.name))
+            raise _changed()
         return pb.VerifyFileResponse(receipt=receipt)
 
     async def _digest(self, key: str, found: StoredObject, send: _Send) -> bytes:
@@ -301,10 +313,20 @@ class ReceiverService:
             Refusal: Always: to the robot.
         """
         if await self._call(self._store.find, key) != found:
-            raise Refusal(pb.UPLOAD_ERROR_CODE_STORE, "the file has changed while it was read")
-        await self._call(self._store.delete, key)
+            raise _changed()
+        try:
+            await self._call(self._store.delete, key, found.etag)
+        except StoreError as error:
+            if error.problem is StoreProblem.CHANGED:
+                raise _changed() from error
+            raise
         text = "the bytes in the store are not the robot's; they were deleted"
         raise Refusal(pb.UPLOAD_ERROR_CODE_WRONG_CONTENT, text)
+
+    async def _forget(self, key: str) -> None:
+        """Deletes a receipt."""
+        if receipt := await self._call(self._store.find, key):
+            await self._call(self._store.delete, key, receipt.etag)
 
     async def _complete_upload(self, robot: str, request: pb.CompleteUploadRequest, send: _Send) -> Message:
         recording, names = request.recording, sorted(set(request.file_names))
@@ -326,6 +348,8 @@ class ReceiverService:
         if digest_of(files) != recording.sha256 or size != recording.size:
             text = "the files that are verified are not those of the recording"
             raise Refusal(pb.UPLOAD_ERROR_CODE_NOT_VERIFIED, text)
+        if missing := await self._missing(keys, files):
+            raise _not_verified(missing)
         location = self._store.location(keys.folder)
         receipt = self._sign(self._receipt_of(robot, recording), location)
         plain = Recording.FromString(recording.SerializeToString())
@@ -355,24 +379,29 @@ class ReceiverService:
                     raise _not_verified(name)
                 files.append(file)
 
+    async def _missing(self, keys: RecordingKeys, files: Iterable[RecordingFile]) -> str:
+        """Returns the name of a file that is not in the store with its size; empty if all are."""
+        sizes = await self._call(self._store.sizes, f"{keys.folder}/", 2 * _MOST_FILES)
+        return next((file.name for file in files if sizes.get(keys.file(file.name)) != file.size), "")
+
     async def _receipt(self, robot: str, keys: RecordingKeys, file: RecordingFile) -> pb.SignedReceipt | None:
-        """Returns the receipt of a file, if there is one.
+        """Returns the receipt of a file that is in the store, if there is one.
 
         Raises:
             Refusal: There is one, of other content.
         """
         content = await self._call(self._store.read, keys.receipt(file.name), _RECEIPT_BYTES)
         signed = _parsed(pb.SignedReceipt, content) if content else None
-        if signed is None:
+        verified = _parsed(pb.Receipt, signed.receipt) if signed else None
+        if not signed or not verified or not self._counts(signed, verified):
             return None
-        recording = Recording(id=keys.recording_id)
-        if self._counts(signed, self._receipt_of(robot, recording, file)):
+        found = await self._call(self._store.find, keys.file(file.name))
+        if found is None or found.size != verified.size:
+            return None
+        if self._counts(signed, self._receipt_of(robot, Recording(id=keys.recording_id), file)):
             return signed
-        verified = _parsed(pb.Receipt, signed.receipt)
-        if verified and self._counts(signed, verified):
-            text = f"{file.name} was verified with other content before, which is kept"
-            raise Refusal(pb.UPLOAD_ERROR_CODE_INVALID, text)
-        return None
+        text = f"{file.name} was verified with other content before, which is kept"
+        raise Refusal(pb.UPLOAD_ERROR_CODE_INVALID, text)
 
     def _counts(self, signed: pb.SignedReceipt, expected: pb.Receipt) -> bool:
         try:
@@ -398,10 +427,24 @@ class ReceiverService:
         return self._party.signer.sign(receipt)
 
     async def _list(self, robot: str, stored: pb.StoredRecording) -> None:
-        """Lists a recording in the hub's bucket."""
+        """Lists a recording in the hub's bucket.
+
+        Raises:
+            Refusal: The hub has no place for it.
+            HubError: The hub does not answer.
+        """
         if stored.ByteSize() > _MOST_IN_RECORD:
             stored = pb.StoredRecording(recording=stored.recording, receipt=stored.receipt)
-        await self._records.put(RECORDINGS, f"{robot}.{stored.recording.id}", stored.SerializeToString())
+        try:
+            await self._records.put(RECORDINGS, f"{robot}.{stored.recording.id}", stored.SerializeToString())
+        except HubError as error:
+            if error.reason is HubReason.TOO_LARGE:
+                text = "the description of the recording is too large for the hub"
+                raise Refusal(pb.UPLOAD_ERROR_CODE_INVALID, text) from error
+            if error.reason is HubReason.FULL:
+                text = "the hub's list of recordings is full"
+                raise Refusal(pb.UPLOAD_ERROR_CODE_STORE, text) from error
+            raise
 
     def _keys(self, robot: str, recording_id: str) -> RecordingKeys:
         return RecordingKeys(self._party.fleet, robot, recording_id)
@@ -415,6 +458,7 @@ class ReceiverService:
 _CODES: Final = {
     StoreProblem.NO_ROOM: pb.UPLOAD_ERROR_CODE_NO_ROOM,
     StoreProblem.MISSING: pb.UPLOAD_ERROR_CODE_NO_SUCH_UPLOAD,
+    StoreProblem.CHANGED: pb.UPLOAD_ERROR_CODE_STORE,
     StoreProblem.REFUSED: pb.UPLOAD_ERROR_CODE_STORE,
 }
 
@@ -464,6 +508,10 @@ def _part_size(size: int, number: int) -> int:
 
 def _not_verified(name: str) -> Refusal:
     return Refusal(pb.UPLOAD_ERROR_CODE_NOT_VERIFIED, f"{name!a} is not verified")
+
+
+def _changed() -> Refusal:
+    return Refusal(pb.UPLOAD_ERROR_CODE_STORE, "the file has changed while it was read")
 
 
 _M = TypeVar("_M", bound=Message)

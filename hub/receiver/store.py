@@ -3,13 +3,13 @@
 Every call has the library's deadlines (5 s to connect, 30 s without a byte) and is repeated twice at most.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from enum import Enum
 from itertools import islice
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import boto3
 from botocore.config import Config
@@ -31,6 +31,9 @@ _NO_ROOM: Final = frozenset(
     {"QuotaExceeded", "XMinioStorageFull", "InsufficientStorage", "StorageFull", "EntityTooLarge", "507"}
 )
 _MISSING: Final = frozenset({"NoSuchKey", "NoSuchUpload", "404", "InvalidPart", "InvalidPartOrder"})
+_CHANGED: Final = frozenset({"PreconditionFailed", "ConditionalRequestConflict", "412"})
+_NO_CONDITIONS: Final = "NotImplemented"
+"""Of a store that knows no conditions of this request."""
 
 
 class StoreProblem(Enum):
@@ -39,6 +42,8 @@ class StoreProblem(Enum):
     NO_ROOM = "no room"
     MISSING = "missing"
     """It has no such object, upload or part."""
+    CHANGED = "changed"
+    """It has another object there by now."""
     REFUSED = "refused"
     """It refuses, or does not answer."""
 
@@ -140,10 +145,26 @@ class Store:
         with _problems():
             self._client.put_object(Bucket=self._bucket, Key=key, Body=content)
 
-    def delete(self, key: str) -> None:
-        """Deletes an object, if it is there."""
+    def create(self, key: str) -> None:
+        """Writes an empty object, unless there is one."""
+        try:
+            with _problems():
+                _if(self._client.put_object, {"IfNoneMatch": "*"}, Bucket=self._bucket, Key=key, Body=b"")
+        except StoreError as error:
+            if error.problem is not StoreProblem.CHANGED:
+                raise
+
+    def delete(self, key: str, etag: str) -> None:
+        """Deletes an object, as long as it is the one with that entity tag."""
         with _problems():
-            self._client.delete_object(Bucket=self._bucket, Key=key)
+            _if(self._client.delete_object, {"IfMatch": etag}, Bucket=self._bucket, Key=key)
+
+    def sizes(self, prefix: str, most: int) -> dict[str, int]:
+        """Returns the sizes of objects by key, so many at most."""
+        with _problems():
+            pages = self._client.get_paginator("list_objects_v2").paginate(Bucket=self._bucket, Prefix=prefix)
+            found = (each for page in pages for each in page.get("Contents", []))
+            return {each["Key"]: each["Size"] for each in islice(found, most)}
 
     def open_upload(self, key: str) -> str:
         """Returns the ID of the upload of a key: the oldest that is not completed, or a new one."""
@@ -192,25 +213,26 @@ class Store:
             )
 
     def complete(self, key: str, upload_id: str, parts: Sequence[tuple[int, str]]) -> None:
-        """Puts parts, each with its number and entity tag, together to an object."""
+        """Puts parts, each with its number and entity tag, together to an object, unless there is one."""
         with _problems():
-            self._client.complete_multipart_upload(
+            _if(
+                self._client.complete_multipart_upload,
+                {"IfNoneMatch": "*"},
                 Bucket=self._bucket,
                 Key=key,
                 UploadId=upload_id,
                 MultipartUpload={"Parts": [{"PartNumber": number, "ETag": etag} for number, etag in parts]},
             )
 
-    def open_uploads(self, prefix: str, most: int) -> list[OpenUpload]:
-        """Returns uploads that are not completed, so many at most."""
+    def open_uploads(self, prefix: str) -> Iterator[OpenUpload]:
+        """Yields the uploads that are not completed."""
         with _problems():
             pages = self._client.get_paginator("list_multipart_uploads").paginate(
                 Bucket=self._bucket, Prefix=prefix
             )
-            found = (each for page in pages for each in page.get("Uploads", []))
-            return [
-                OpenUpload(each["Key"], each["UploadId"], each["Initiated"]) for each in islice(found, most)
-            ]
+            for page in pages:
+                for each in page.get("Uploads", []):
+                    yield OpenUpload(each["Key"], each["UploadId"], each["Initiated"])
 
     def abort(self, upload: OpenUpload) -> None:
         """Deletes an upload and its parts; another receiver may have done so."""
@@ -235,7 +257,9 @@ def _problems() -> Iterator[None]:
     try:
         yield
     except ClientError as error:
-        code = str(error.response.get("Error", {}).get("Code", ""))
+        code = _code(error)
+        if code in _CHANGED:
+            raise StoreError(StoreProblem.CHANGED, "the store has another object there by now") from error
         if code in _NO_ROOM:
             raise StoreError(StoreProblem.NO_ROOM, "the store has no room") from error
         if code in _MISSING:
@@ -244,6 +268,20 @@ def _problems() -> Iterator[None]:
     except (BotoCoreError, HTTPClientError, OSError) as error:
         text = f"the store does not answer ({type(error).__name__})"
         raise StoreError(StoreProblem.REFUSED, text) from error
+
+
+def _if(call: Callable[..., Any], condition: dict[str, str], **request: Any) -> None:
+    """Calls with a condition; without it where the store knows none, and the looks before have to do."""
+    try:
+        call(**request, **condition)
+    except ClientError as error:
+        if _code(error) != _NO_CONDITIONS:
+            raise
+        call(**request)
+
+
+def _code(error: ClientError) -> str:
+    return str(error.response.get("Error", {}).get("Code", ""))
 
 
 def _client(settings: StoreSettings, endpoint: str | None) -> "S3Client":

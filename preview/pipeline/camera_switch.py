@@ -11,7 +11,8 @@ nothing, costs the live camera nothing.
 2. With the first of them, the live camera's pad is unlinked while nothing passes it, and the candidate's pad
    linked; from here on what the old camera delivers is dropped.
 3. The valve opens for the first frame that is later than the newest one of the old camera: time never runs
-   backwards for the encoder.
+   backwards for the encoder. A camera whose stamps lag is waited for as long as they do; its frames are not
+   moved in time, because a driver has to see how old a picture is.
 4. The old camera is stopped and removed, with a deadline.
 
 Python runs per frame only during these steps.
@@ -67,6 +68,11 @@ class Candidate:
         self._gate = _Gate(parts.body_pad)
         self._valve = self._pad.add_probe(_BUFFERS | Gst.PadProbeType.EVENT_DOWNSTREAM, self._drop)
         parts.pipeline.add(self.source)
+
+    @property
+    def held_back(self) -> int:
+        """Frames that it delivered once it was linked, and whose time had passed by then."""
+        return self._gate.held_back
 
     def fail(self, what: str) -> None:
         """Has `deliver` raise CameraFailedError, if it waits."""
@@ -170,10 +176,17 @@ class _Gate:
     def __init__(self, pad: Any) -> None:
         self._pad = pad
         self._newest = 0
+        self._held_back = 0
         self._opening = False
         self._removed = False
         self._lock = threading.Lock()
         self._probe_id = pad.add_probe(_BUFFERS, self._probe)
+
+    @property
+    def held_back(self) -> int:
+        """Frames so far whose time had passed when they came."""
+        with self._lock:
+            return self._held_back
 
     def open(self) -> None:
         """Removes it after the next frame that is later than all before."""
@@ -194,6 +207,7 @@ class _Gate:
             return Gst.PadProbeReturn.OK
         with self._lock:
             if buffer.pts <= self._newest:
+                self._held_back += 1
                 return Gst.PadProbeReturn.DROP
             self._newest = buffer.pts
             if self._opening and not self._removed:

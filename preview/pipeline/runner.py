@@ -76,6 +76,8 @@ class Runner:
         self._file_loop: FileLoop | None = None
         self._attach_source()
         self._candidate: Candidate | None = None
+        self._live: Candidate | None = None
+        """The camera that took over last."""
         """A camera that is being started beside the live one."""
         self._begun = False
         """Whether the first frame has come."""
@@ -335,11 +337,14 @@ class Runner:
 
     async def _watch(self) -> None:
         """Checks the watchdogs every 0.2 s and measures every window, until the pipeline fails or stops."""
-        watchdogs = Watchdogs(time.monotonic(), self._timeouts)
+        watchdogs, held_back = Watchdogs(time.monotonic(), self._timeouts), 0
         reading = statistics.read(self._framing, self._listener)
         while True:
             await asyncio.sleep(_CHECK_INTERVAL_S)
             now = time.monotonic()
+            if self._live and self._live.held_back != held_back:
+                held_back = self._live.held_back
+                watchdogs = Watchdogs(now, self._timeouts)  # It delivers, and its time has not come yet.
             silent = watchdogs.check(self._parts.rate.get_property("in"), self._framing.frames, now)
             if silent and not self._lost:
                 self._fail(faults.of(*silent, self.plan))
@@ -404,7 +409,7 @@ class Runner:
             self._detach_source()
             self._parts = replace(self._parts, source=candidate.source)
             self.plan = replace(self.plan, source=source)
-            self._candidate = self._lost = None
+            self._live, self._candidate, self._lost = candidate, None, None
             self._attach_source()
         self._request_key_frame()
         if self._showing is source:

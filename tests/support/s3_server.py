@@ -97,7 +97,8 @@ class FaultyStore:
         cut_at: closes the connection once so many bytes of parts have arrived in all, once.
         answers: status and code of the next requests, in place of the store's; None passes one on.
         early: whether these come before the body is read.
-        damage: the number of the part that is changed on its way, once.
+        refused: part of the paths of which no request is passed on; they get 400.
+    damage: the number of the part that is changed on its way, once.
     cut_reading_at: closes the connection after so many bytes of an object that is read, once.
     ranges: of the requests that read objects, in order; empty for the whole.
     """
@@ -108,6 +109,7 @@ class FaultyStore:
     cut_at: int | None = None
     answers: deque[tuple[int, str] | None] = field(default_factory=deque)
     early: bool = False
+    refused: str = ""
     damage: int = 0
     cut_reading_at: int | None = None
     ranges: list[str] = field(default_factory=list)
@@ -135,6 +137,8 @@ async def faulty_store(server: S3Server) -> AsyncIterator[FaultyStore]:
         async def handle(request: web.Request) -> web.StreamResponse:
             number = int(request.query.get("partNumber", "0"))
             answer = state.answers.popleft() if state.answers else None
+            if state.refused and state.refused in request.path:
+                answer = (400, "InvalidRequest")
             if answer and state.early:
                 return _error(*answer)
             body = bytearray()

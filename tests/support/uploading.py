@@ -204,7 +204,7 @@ async def running_uploads(
 
     running = Running(
         Uploads(
-            UploadSettings(store_hosts=(host,), insecure_store=True, **settings),
+            UploadSettings.model_validate({"store_hosts": (host,), "insecure_store": True} | settings),
             Fleet(fleet=FLEET, robot=ROBOT, keys=keys),
             store=rows,
             source=robot,

@@ -35,7 +35,7 @@ from gateway.status.recording import RecorderView
 _log = logging.getLogger(__name__)
 
 MOST_WAITING: Final = 256
-"""Beyond that the oldest is dropped, and comes with its next change."""
+"""Beyond that the oldest is dropped, and comes again with a later report."""
 MOST_REMEMBERED: Final = 1024
 """Recordings of which is known what the recorder has."""
 PROGRESS_EVERY_S: Final = 5.0

@@ -17,7 +17,7 @@ from tests.support.waiting import wait_until
 
 pytestmark = [pytest.mark.on_request, pytest.mark.docker, pytest.mark.timeout(1500)]
 
-IMAGES = ("robot-gateway", "robot-preview", "robot-drive", "robot-recorder")
+IMAGES = ("robot-gateway", "robot-preview", "robot-drive", "robot-recorder", "robot-bridge")
 
 
 @pytest.fixture(scope="module")

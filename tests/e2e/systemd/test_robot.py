@@ -11,20 +11,22 @@ from tests.support.waiting import wait_until
 
 pytestmark = [pytest.mark.on_request, pytest.mark.docker, pytest.mark.timeout(900)]
 
-PROGRAMS = ("gateway", "preview", "drive", "recorder", "bridge")
+PROGRAMS = ("gateway", "preview", "drive", "recorder", "bridge", "tap")
 SOCKETS = {
     "preview": "/run/robot-gateway/preview.sock",
     "tap": "/run/robot-video/tap.sock",
     "drive": "/run/robot-drive/drive.sock",
     "recorder": "/run/robot-recorder/recorder.sock",
     "bridge": "/run/robot-bridge/bridge.sock",
+    "camera tap": "/run/robot-tap/tap.sock",
 }
 CONNECTS = {
     "gateway": {"preview", "drive", "recorder", "bridge"},
-    "preview": {"preview", "tap"},
+    "preview": {"preview", "tap", "camera tap"},
     "drive": {"drive"},
     "recorder": {"recorder", "tap"},
     "bridge": {"bridge"},
+    "tap": {"camera tap"},
 }
 """Who may connect to which socket: who listens there, and whose container has its volume."""
 GATEWAY = """
@@ -39,7 +41,7 @@ FROZEN_BACK_WITHIN_S = 45
 
 @pytest.fixture(scope="module")
 def robot() -> Iterator[SystemdRobot]:
-    """With all five programs, and simulated sensors and wheels."""
+    """With all six programs, and simulated sensors and wheels."""
     build_image()
     with running_robot(f"robot-systemd-{os.getpid()}") as robot:
         robot.run(
@@ -59,7 +61,9 @@ def robot() -> Iterator[SystemdRobot]:
         config = robot.output("cat", "/etc/robot-gateway/gateway.yaml")
         robot.write("/etc/robot-gateway/gateway.yaml", config + GATEWAY)
         robot.write("/etc/robot-gateway/recorder.yaml", "room: {min_free_bytes: 0}\n")
-        robot.run("systemctl", "enable", "--now", "robot-drive", "robot-recorder", "robot-bridge")
+        robot.run(
+            "systemctl", "enable", "--now", "robot-drive", "robot-recorder", "robot-bridge", "robot-tap"
+        )
         robot.run("systemctl", "restart", "robot-gateway")
         for program in PROGRAMS:
             robot.wait_active(program)

@@ -184,6 +184,35 @@ async def test_more_requests_than_permitted_are_told_so(servers: NatsServers) ->
         assert sorted(await asyncio.gather(*pending)) == [b"busy", b"done", b"done"]
 
 
+async def test_one_robot_has_a_share_of_the_requests_in_hand(servers: NatsServers) -> None:
+    proceed, other_is_served = asyncio.Event(), asyncio.Event()
+
+    async def answer(request: Request) -> None:
+        if request.robot == "r2":
+            other_is_served.set()
+        await proceed.wait()
+        await request.respond(b"done")
+
+    async with (
+        connect(FleetAddress(servers.urls)) as receiver,
+        connect(FleetAddress(servers.urls, inbox=names.inbox_prefix("r1"))) as greedy,
+        connect(FleetAddress(servers.urls, inbox=names.inbox_prefix("r2"))) as other,
+    ):
+        for each in (receiver, greedy, other):
+            await each.connected(10)
+        await receiver.serve(
+            names.UPLOAD_SUBJECTS, names.RECEIVERS, answer, at_once=4, of_one=2, busy=b"busy"
+        )
+        pending = [asyncio.ensure_future(greedy.request("fleet.r1.up.x", b"", 20)) for _ in range(6)]
+        while sum(each.done() for each in pending) < 4:
+            await asyncio.wait([each for each in pending if not each.done()], return_when="FIRST_COMPLETED")
+        asked = asyncio.ensure_future(other.request("fleet.r2.up.x", b"", 20))
+        await asyncio.wait_for(other_is_served.wait(), 20)
+        proceed.set()
+        assert await asked == b"done"
+        assert sorted(await asyncio.gather(*pending)) == [b"busy"] * 4 + [b"done"] * 2
+
+
 _GREETINGS = (
     b"",
     b"HTTP/1.1 400 Bad Request\r\n\r\n",

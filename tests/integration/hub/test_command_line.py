@@ -12,7 +12,7 @@ from typer.testing import CliRunner, Result
 from common.errors import UserError
 from fleet import names
 from fleet.connection import Entry, FleetAddress, connect
-from fleet.errors import RefusedError
+from fleet.errors import HubError, HubReason, RefusedError
 from hub.cli import app
 from tests.support.free import free_tcp_port
 from tests.support.nats_servers import NatsServers
@@ -76,6 +76,55 @@ def test_other_limits_are_reported_and_not_changed(hub: Path) -> None:
     result = _type("apply", "--dir", str(hub), "--events-days", "3")
     assert result.exit_code == 1
     assert "fleet_events: max_age is" in result.output
+
+
+def test_a_robot_that_fills_a_stream_for_all_is_found_and_purged(hub: Path, tmp_path: Path) -> None:
+    _type("apply", "--dir", str(hub), "--events-mib", "1")
+    addresses = {}
+    for robot in ("r1", "r2"):
+        _type("enroll", robot, "--dir", str(hub), "--out", str(tmp_path / robot))
+        url = re.search(r"tls://\S+", (tmp_path / robot / "fleet.yaml").read_text(encoding="utf-8"))
+        assert url is not None
+        files = tmp_path / robot
+        addresses[robot] = FleetAddress(
+            (url[0],), files / "bridge.creds", files / "ca.pem", names.inbox_prefix(robot)
+        )
+    assert asyncio.run(_fill(addresses["r1"], "r1")) > 10
+    _type("revoke", "r1", "--dir", str(hub))
+    with pytest.raises(HubError) as full:
+        asyncio.run(_publish_event(addresses["r2"], "r2"))
+    assert full.value.reason is HubReason.FULL, "revoked, and still in the way of all"
+    use = _type("usage", "--dir", str(hub)).output
+    assert re.search(r"fleet_events +1\.0 +1 +(9\d|100) %", use)
+    assert re.search(r"r1 +1\d\d *\n r2 +0", use), "who fills it comes first"
+    assert re.search(
+        r"fleet_events: deleted 1\d\d messages of r1", _type("purge", "r1", "--dir", str(hub)).output
+    )
+    asyncio.run(_publish_event(addresses["r2"], "r2"))
+    assert "deleted 1 messages of r2" not in _type("purge", "r1", "--recordings", "--dir", str(hub)).output
+    assert re.search(r"r2 +1 *\n", _type("usage", "--dir", str(hub)).output), "of r2 all is there"
+    with pytest.raises(UserError, match="no robot"):
+        _type("purge", "r3", "--dir", str(hub))
+
+
+async def _publish_event(address: FleetAddress, robot: str) -> None:
+    async with connect(address) as hub:
+        await hub.connected(5)
+        await hub.publish_once(names.event_subject(robot, "run", 1), b"x" * 8192)
+
+
+async def _fill(address: FleetAddress, robot: str) -> int:
+    """Publishes until the stream takes nothing more; returns how many messages it has taken."""
+    async with connect(address) as hub:
+        await hub.connected(5)
+        for number in range(1000):
+            try:
+                await hub.publish_once(names.event_subject(robot, "run", number), b"x" * 8192)
+            except HubError as error:
+                if error.reason is not HubReason.FULL:
+                    raise
+                return number
+    raise AssertionError("it takes any number")
 
 
 def test_logins_of_people_and_receivers(hub: Path, tmp_path: Path) -> None:

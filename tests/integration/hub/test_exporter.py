@@ -47,6 +47,8 @@ async def test_it_follows_the_hub_over_an_outage(tmp_path: Path) -> None:
             up = holds('robot_fleet_up{robot="lab1"} 1.0', "robot_fleet_hub_connected 1.0")
             text = await eventually(scrape, up, "the robot is up")
             assert "stranger" not in text
+            full = holds('robot_fleet_stream_used_ratio{stream="KV_fleet_recordings"} 0.0')
+            await eventually(scrape, full, "how full the streams are")
             await asyncio.to_thread(servers.kill, 0)
             gone = holds('robot_fleet_up{robot="lab1"} 1.0', "robot_fleet_hub_connected 0.0")
             await eventually(scrape, gone, "the hub is gone, the robot's last state is not")

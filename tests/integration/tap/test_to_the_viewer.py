@@ -1,5 +1,6 @@
 """From a ROS topic to decoded frames over SRT, with real rclpy, tap and preview, and what can fail there."""
 
+import math
 import os
 import signal
 import time
@@ -23,6 +24,7 @@ pytestmark = [pytest.mark.ros, pytest.mark.gst]
 
 TOPIC = "/front/image_raw"
 HOUR_S = 3600
+WRAP_S = 2**33 / 90_000
 
 
 def ros(topic: str = TOPIC, **more: Any) -> dict[str, Any]:
@@ -306,6 +308,36 @@ def test_three_cameras_of_which_one_is_a_topic(tap: RunningTap, tmp_path: Path) 
                 eye.sees("red", 30)
             assert eye.reconnects == 0
             assert preview.running().counters == pb.Counters(starts=1)
+
+
+def test_a_camera_whose_stamps_lag_takes_over_when_its_time_has_come(tap: RunningTap, tmp_path: Path) -> None:
+    """Its frames are older than the last one that was shown: they wait, and the camera is not to blame."""
+    lag_s = 4.0
+    cameras = {"front": {"kind": "test", "pattern": "green"}, "arm": ros(fallback="front")}
+    with ros_camera(TOPIC) as published, preview_of(tap, tmp_path, cameras=cameras) as preview:
+        published.age_s = lag_s
+        preview.enable()
+        preview.running()
+        with Eye(preview.port) as eye:
+            eye.sees("green")
+            begin = len(eye.seen)
+            choose(preview, "arm")
+            eye.sees("red")
+            eye.more_frames(10)
+            # The colour at the change may be of frames that were decoded together.
+            colours = [each.colour for each in eye.seen[begin:] if each.colour != "mixed"]
+            assert colours == sorted(colours), "green, then red for good"
+            assert lag_s - 1 < eye.longest_gap_s(begin) < lag_s + 1, "as long as the stamps lag"
+            errors = [
+                min(
+                    abs(math.remainder(each.pts_s - HOUR_S - stamp, WRAP_S)) for stamp in published.captured_s
+                )
+                for each in eye.seen[begin:]
+                if each.colour == "red"
+            ]
+            assert max(errors) < 0.001, "each is as old as it is"
+        assert preview.running().counters == pb.Counters(starts=1)
+        assert camera(preview.running(), "arm") == ("LIVE", "")
 
 
 def choose(preview: RunningPreview, name: str) -> None:

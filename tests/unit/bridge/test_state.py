@@ -1,6 +1,8 @@
 """The robot at a glance: what it says, and when it is sent."""
 
-from bridge.state import Own, due_in_s, robot_state, same_but_for_time
+from bridge.config import GatewaySettings
+from bridge.robot.status import StatusReader
+from bridge.state import Own, due_in_s, is_charging, robot_state, same_but_for_time
 from omniseer.fleet.v1.upload_pb2 import UploadBrief
 from omniseer.gateway.v1 import fault_pb2
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus
@@ -64,6 +66,32 @@ def test_values_that_are_no_percentages_stay_in_bounds() -> None:
         made = status()
         made.platform.power.lipo_battery.percentage = value
         assert robot_state(own(), made).battery_percent == shown
+
+
+def test_what_is_stale_is_not_known() -> None:
+    made = status()
+    battery, compute = made.platform.power.lipo_battery, made.platform.compute
+    battery.charging_available = battery.charging = True
+    compute.available = compute.disk_available = True
+    compute.disk_used_percent = 40.0
+    state = robot_state(own(), made)
+    assert (state.battery_percent, state.charging, state.disk_used_percent) == (72, True, 40)
+    battery.stale = compute.stale = True
+    state = robot_state(own(), made)
+    for name in ("battery_percent", "charging", "disk_used_percent"):
+        assert not state.HasField(name)
+
+
+def test_whether_it_charges_is_known_while_the_gateway_says_so() -> None:
+    made = status()
+    made.platform.power.lipo_battery.charging_available = True
+    made.platform.power.lipo_battery.charging = True
+    reader = StatusReader(GatewaySettings())
+    reader.newest, reader.reachable = made, True
+    assert is_charging(reader.current) is True
+    reader.reachable = False
+    assert is_charging(reader.current) is None
+    assert reader.newest is made, "what was last known is shown as such"
 
 
 def test_the_first_uploads_are_named() -> None:

@@ -8,6 +8,7 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from hub.exporter.collector import MOST_ROBOTS, MOST_SERIES, FleetCollector
+from hub.streams import StreamUse
 from omniseer.gateway.v1.fault_pb2 import FAULT_SEVERITY_ERROR, FAULT_SEVERITY_WARNING
 from omniseer.gateway.v1.value_pb2 import TEXT_LEVEL_ERROR
 from tests.support.fleet_values import healthy_state, wrong_bytes
@@ -142,7 +143,17 @@ def test_no_robot_fills_prometheus_or_breaks_the_page(collector: FleetCollector)
     assert samples(collector)["number", "b", "number.motor", "°C"] == 61.5
 
 
+def test_how_full_the_streams_are(collector: FleetCollector) -> None:
+    collector.take_use(StreamUse("fleet_events", 1, 4))
+    collector.take_use(StreamUse("fleet_events", 3, 4))
+    collector.take_use(StreamUse("without_limit", 3, -1))
+    found = samples(collector)
+    assert found["stream_used_ratio", "fleet_events"] == 0.75
+    assert found["stream_used_ratio", "without_limit"] == 0
+
+
 def shown(collector: FleetCollector) -> set[str]:
+    collector.take_use(StreamUse("fleet_events", 1, 4))
     enroll(collector, "a")
     report(collector, "a")
     return {f"robot_fleet_{labels[0]}" for labels in samples(collector)}

@@ -17,6 +17,27 @@ ASK = (
     "import asyncio, json, sys; from bridge.uploads.route import interface_to; "
     "print(json.dumps([asyncio.run(interface_to(each)) for each in sys.argv[1:]]))"
 )
+PUT = """
+import asyncio, json, sys
+from bridge.uploads.config import UploadSettings
+from bridge.uploads.parts import PartSender
+from bridge.uploads.problems import CutError
+
+async def nothing():
+    yield b"x"
+
+async def put(host):
+    hosts = ("10.1.0.9:9000", "both:9000", "10.3.0.9:9000")
+    async with PartSender(UploadSettings(store_hosts=hosts, interfaces=("wlan*",))) as sender:
+        try:
+            return await asyncio.wait_for(sender.put(f"https://{host}/part", 1, nothing()), 3)
+        except CutError as error:
+            return str(error)
+        except TimeoutError:
+            return "connecting"
+
+print(json.dumps([asyncio.run(put(each)) for each in sys.argv[1:]]))
+"""
 Asking = Callable[..., list[str]]
 
 needs_root = pytest.mark.skipif(
@@ -59,9 +80,9 @@ def asking() -> Iterator[Asking]:
         hosts.parent.mkdir(parents=True)
         hosts.write_text("10.1.0.9 store\nfd01::9 six\nfd04::9 both\n10.3.0.9 both\n", encoding="ascii")
 
-        def ask(*stores: str) -> list[str]:
+        def ask(*stores: str, program: str = ASK) -> list[str]:
             done = subprocess.run(
-                ["ip", "netns", "exec", name, sys.executable, "-c", ASK, *stores],
+                ["ip", "netns", "exec", name, sys.executable, "-c", program, *stores],
                 cwd=ROOT,
                 capture_output=True,
                 text=True,
@@ -94,6 +115,14 @@ def test_the_robots_own_address_is_reached_within_it(asking: Asking) -> None:
 @needs_root
 def test_names_are_resolved_and_an_address_without_a_route_is_passed_over(asking: Asking) -> None:
     assert asking("store:9000", "six", "both:9000") == ["wlan0", "wlan0", "wwan0"]
+
+
+@needs_root
+def test_no_connection_is_made_through_an_interface_that_is_not_allowed(asking: Asking) -> None:
+    allowed, *others = asking("10.1.0.9:9000", "10.3.0.9:9000", "both:9000", program=PUT)
+    assert allowed == "connecting"
+    for refused in others:
+        assert "through wwan0; uploads are allowed through wlan*" in refused
 
 
 @needs_root

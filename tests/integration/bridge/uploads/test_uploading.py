@@ -81,6 +81,26 @@ async def test_a_recording_is_uploaded_read_again_and_confirmed(ground: Ground, 
         assert ground.proxy.total == SIZE
 
 
+@pytest.mark.parametrize("damage", [None, b"cut short"])
+async def test_a_receipt_counts_as_long_as_its_bytes_are_there(ground: Ground, damage: bytes | None) -> None:
+    robot, key = Robot(), f"{FLEET}/{ROBOT}/one/data/000001.mcap"
+    robot.add("one", FILES)
+    client, bucket = ground.server.client, ground.store.bucket
+    for _ in range(2):
+        # Each time the robot has forgotten that it was verified.
+        async with (
+            running_receiver(ground.receivers[0]),
+            running_uploads(robot, ground.hub, ground.proxy.host, ground.keys) as running,
+        ):
+            await running.uploads.enqueue("one")
+            await running.until("one", is_in(State.VERIFIED))
+        assert client.get_object(Bucket=bucket, Key=key)["Body"].read() == FILES["data/000001.mcap"]
+        client.delete_object(Bucket=bucket, Key=key)
+        if damage is not None:
+            client.put_object(Bucket=bucket, Key=key, Body=damage)
+    assert ground.proxy.total == SIZE + len(FILES["data/000001.mcap"]), "only what was missing is sent again"
+
+
 async def test_an_expired_url_is_renewed(ground: Ground) -> None:
     robot = Robot()
     robot.add("one", {"data.bin": content(20 * MIB)})
@@ -136,6 +156,27 @@ async def test_a_store_that_refuses_is_tried_again(
         assert words in failed.reason
         await running.until("one", is_in(State.VERIFIED))
         assert running.uploads.cuts == 1
+
+
+async def test_a_recording_that_the_store_refuses_for_ever_holds_up_no_other(ground: Ground) -> None:
+    robot = Robot()
+    robot.add("poison", {"data.bin": b"x"}, kind=wire.RECORDING_KIND_INCIDENT)
+    for number in range(3):
+        robot.add(f"good-{number}", {"data.bin": b"data"})
+    ground.proxy.refused = "/poison/"
+    async with (
+        running_receiver(ground.receivers[0]),
+        running_uploads(robot, ground.hub, ground.proxy.host, ground.keys) as running,
+    ):
+        for recording_id in robot.recordings:
+            await running.uploads.enqueue(recording_id)
+        for number in range(3):
+            await running.until(f"good-{number}", is_in(State.VERIFIED))
+        poison = await running.until("poison", is_in(State.FAILED))
+        assert poison
+        assert "400 InvalidRequest" in poison.reason
+        ground.proxy.refused = ""
+        await running.until("poison", is_in(State.VERIFIED))
 
 
 async def test_wrong_bytes_are_deleted_and_sent_again(ground: Ground) -> None:

@@ -2,9 +2,9 @@
 
 import asyncio
 import hashlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from common.healthcheck import state_of
 from fleet.connection import FleetAddress, Hub, connect
 from fleet.names import reading_subject, upload_subject
 from hub.receiver.app import AT_ONCE, sweep
-from hub.receiver.store import PART_BYTES, Store
+from hub.receiver.store import PART_BYTES, OpenUpload, Store
 from omniseer.fleet.v1 import upload_pb2 as pb
 from omniseer.gateway.v1.recording_pb2 import Recording, RecordingFile
 from tests.support.free import free_tcp_port
@@ -211,6 +211,27 @@ async def test_abandoned_uploads_are_swept_by_two_at_once(ground: Ground) -> Non
         store.close()
     left = client.list_multipart_uploads(Bucket=bucket)["Uploads"]
     assert [each["Key"] for each in left] == ["another-fleet/r1/one/x"]
+
+
+async def test_young_uploads_hide_no_abandoned_one() -> None:
+    class Listing:
+        """A store with many uploads that run, and an abandoned one behind them."""
+
+        def __init__(self) -> None:
+            now = datetime.now(UTC)
+            self.uploads = [OpenUpload(f"lab/r1/{number:05}", "u", now) for number in range(1500)]
+            self.uploads.append(OpenUpload("lab/r2/one", "u", now - timedelta(days=9)))
+            self.aborted: list[str] = []
+
+        def open_uploads(self, _prefix: str) -> Iterator[OpenUpload]:
+            yield from self.uploads
+
+        def abort(self, upload: OpenUpload) -> None:
+            self.aborted.append(upload.key)
+
+    store: Any = Listing()
+    assert sweep(store, f"{FLEET}/", datetime.now(UTC) - timedelta(days=7)) == 1
+    assert store.aborted == ["lab/r2/one"]
 
 
 async def test_metrics_and_health(ground: Ground) -> None:

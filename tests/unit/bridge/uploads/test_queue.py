@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from bridge.uploads.queue import (
     LONGEST_PAUSE_S,
+    MOST_CUTS,
     RUNNING,
     TRANSITIONS,
     WAITING,
@@ -19,6 +20,7 @@ from bridge.uploads.queue import (
     in_order,
     next_upload,
     pause_s,
+    progressed,
     step,
 )
 
@@ -105,3 +107,31 @@ def test_the_most_urgent_is_next_and_one_that_just_failed_waits() -> None:
         "old",
         "new",
     ]
+
+
+def test_cuts_in_succession_without_progress_are_a_failure_of_the_recording() -> None:
+    upload = replace(UPLOAD, state=State.UPLOADING)
+    for _ in range(MOST_CUTS - 1):
+        upload = step(upload, Event.CUT, 100.0, "cut")
+        assert (upload.state, upload.due_s) == (State.FAILED, 0.0), "all of the queue waits"
+        upload = step(step(upload, Event.RESUME, 100.0), Event.BEGIN, 100.0)
+    for failures in (1, 2, 3):
+        failed = step(upload, Event.CUT, 100.0, "cut")
+        assert (failed.failures, failed.due_s) == (failures, 100.0 + pause_s(failures))
+        upload = step(step(failed, Event.RESUME, 200.0), Event.BEGIN, 200.0)
+
+
+def test_progress_ends_a_succession_of_cuts() -> None:
+    upload = replace(UPLOAD, state=State.UPLOADING, bytes_done=10, cuts=MOST_CUTS - 1)
+    assert progressed(upload, 10).cuts == MOST_CUTS - 1
+    assert progressed(upload, 11).cuts == 0
+    assert progressed(upload, 1000).bytes_done == upload.size
+
+
+def test_what_is_cut_again_and_again_goes_last_until_the_path_has_been_seen_to_work() -> None:
+    cut = replace(UPLOAD, recording_id="cut", priority=Priority.INCIDENT, state=State.FAILED, cuts=MOST_CUTS)
+    other = replace(UPLOAD, recording_id="other", state=State.QUEUED)
+    assert next_upload([cut, other], 0.0, path_works=False) == other
+    assert next_upload([cut], 0.0, path_works=False) == cut
+    assert next_upload([cut, other], 0.0, path_works=True) == cut
+    assert next_upload([replace(cut, due_s=9.0), other], 0.0, path_works=True) == other

@@ -84,9 +84,10 @@ class WatchStateResponse(_message.Message):
 
     @_builtins.property
     def copies(self) -> _containers.RepeatedCompositeFieldContainer[Global___CopyReport]:
-        """The copies of the recordings that wait, run or have ended last, at most 64: what the recorder is to know. Those
-        that wait or run come first. One that was cancelled is among those that have ended, with
-        RECORDING_COPY_STATE_UNSPECIFIED, so that the recorder may delete the recording again.
+        """Copies of recordings, at most 64: what the recorder is to know. Those that run or have failed come first, then
+        those that the list of recordings does not show as they are, each in its turn, then others that wait or have
+        ended last. So in a series of reports there is every copy that the recorder may not have. One that was cancelled
+        is reported with RECORDING_COPY_STATE_UNSPECIFIED, so that the recorder may delete the recording again.
         """
 
     @_builtins.property

@@ -98,11 +98,11 @@ class RobotState(_message.Message):
     fault_count: _builtins.int
     """Active faults in all."""
     battery_percent: _builtins.int
-    """State of charge of the robot's main battery, in percent, rounded to whole ones. Unset: not known."""
+    """State of charge of the robot's main battery, in percent, rounded to whole ones. Unset: stale, or not known."""
     charging: _builtins.bool
-    """Whether it is being charged. Unset: not known."""
+    """Whether it is being charged. Unset: stale, or not known."""
     disk_used_percent: _builtins.int
-    """Used part of the robot's disk, in percent, rounded to whole ones. Unset: not known."""
+    """Used part of the robot's disk, in percent, rounded to whole ones. Unset: stale, or not known."""
     preview: _states_pb2.PreviewState.ValueType
     """The preview."""
     drive: _teleop_pb2.DrivePhase.ValueType
