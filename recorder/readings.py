@@ -54,7 +54,10 @@ class Readings:
     @property
     def last_error(self) -> str:
         """Why it can't record, or not all of what is wanted; empty when all is well."""
-        return self._parts.life.error or self._parts.sources.problem
+        parts = self._parts
+        ring = parts.ring.problem if parts.ring else ""
+        recordings = next(iter(list(parts.catalogue.problems.values())), "")
+        return parts.life.error or ring or parts.sources.problem or recordings
 
     @property
     def running(self) -> Manifest | None:

@@ -11,6 +11,7 @@ from recorder.readings import Readings
 from recorder.reports import Failed, Finished
 from recorder.store.housekeeping import LEAST_ROOM
 from recorder.store.manifest import Manifest, RecordingState, StopReason
+from recorder.store.room import is_full
 from recorder.store.salvage import salvage, with_interruption
 
 _log = logging.getLogger(__name__)
@@ -103,7 +104,7 @@ class Recorder:
     async def _begin(self) -> None:
         """Reads the disk, recovers what was cut off, and goes on with what ran; also after a fault."""
         try:
-            goes_on = await asyncio.to_thread(self._load)
+            goes_on = await self._load()
         except OSError as error:
             self._life.fault(f"the folder of recordings can't be read or written: {error.strerror}")
             return
@@ -118,17 +119,43 @@ class Recorder:
             await self._go_on(goes_on)
         await self._open_ring()
 
-    def _load(self) -> Manifest | None:
-        """Reads the disk; in a thread."""
-        parts = self._parts
-        parts.catalogue.load()
-        parts.state_file.load()
-        if parts.segments:
-            parts.segments.load()
-        ring = parts.segments.segments if parts.segments else ()
-        goes_on = salvage(parts.catalogue, ring, parts.boot_id)
-        parts.reserve.take()
+    async def _load(self) -> Manifest | None:
+        """Reads the disk and makes whole what was cut off; where it is full, after room has been made."""
+        await asyncio.to_thread(self._read)
+        try:
+            goes_on = await asyncio.to_thread(self._salvage)
+        except OSError as error:
+            if not is_full(error):
+                raise
+            await self._parts.housekeeping.make_room(LEAST_ROOM)
+            goes_on = await asyncio.to_thread(self._salvage)
+        await asyncio.to_thread(self._take_reserve)
         return goes_on
+
+    def _read(self) -> None:
+        # Making whole needs some room, and the disk may have no other.
+        self._parts.reserve.give()
+        self._parts.catalogue.load()
+        self._parts.state_file.load()
+
+    def _salvage(self) -> Manifest | None:
+        parts = self._parts
+        if parts.segments:
+            try:
+                parts.segments.load()
+            except OSError as error:  # It is opened, and tried again, apart from the recordings.
+                _log.error("what was left of the ring can't be read: %s", error)
+        ring = parts.segments.segments if parts.segments else ()
+        return salvage(parts.catalogue, ring, parts.boot_id)
+
+    def _take_reserve(self) -> None:
+        """Shows whether the disk can be written. A full one can: a recording that begins makes room."""
+        try:
+            self._parts.reserve.take()
+        except OSError as error:
+            if not is_full(error):
+                raise
+            _log.warning("the disk is full: no space is reserved for closing files")
 
     async def _go_on(self, manifest: Manifest) -> None:
         """Continues a recording that a former process of the same boot has left."""
@@ -225,9 +252,11 @@ class Recorder:
             self._ring_failed(error)
 
     def _ring_failed(self, error: OSError) -> None:
+        assert self._ring, "it has failed"  # noqa: S101  # for the type checker
         self._outputs.ring = None
-        what = f"the ring can't be written: {error.strerror}; it is tried again by itself"
-        if self._life.state is State.IDLE:
-            self._life.fault(what)
+        self._ring.problem = f"the ring can't be written: {error.strerror}; it is tried again by itself"
+        # A full disk is no fault: a recording that begins may delete older ones, which the ring may not.
+        if self._life.state is State.IDLE and not is_full(error):
+            self._life.fault(self._ring.problem)
         else:
-            self._life.try_later(what)
+            self._life.try_later(self._ring.problem)

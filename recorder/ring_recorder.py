@@ -52,6 +52,9 @@ class RingRecorder:
         housekeeping: makes room for snapshots.
         boot_id: of the computer; empty if unknown.
         run_id: of this process.
+
+    Attributes:
+        problem: why it can't be written, for people; empty if it can.
     """
 
     def __init__(
@@ -76,6 +79,7 @@ class RingRecorder:
         self._boot_id = boot_id
         self._run_id = run_id
         self._pending: list[_Snapshot] = []
+        self.problem = ""
         incidents = settings.incidents
         self._incidents = Incidents(
             Rules(
@@ -130,6 +134,7 @@ class RingRecorder:
         output = Output(self.shape(), self._writer.head, closed)
         await asyncio.wrap_future(self._writer.add(output))
         self._outputs.ring = output
+        self.problem = ""
 
     async def close(self) -> None:
         """Makes the last segment final."""
@@ -251,13 +256,13 @@ class RingRecorder:
 
     def _begun(self, manifest: Manifest, segments: list[RingSegment]) -> Manifest:
         """Makes a snapshot's folder, with what the ring has of it already; in a thread."""
-        folder = self._catalogue.create(manifest)
         try:
+            folder = self._catalogue.create(manifest)
             for segment in segments:
                 manifest = link_next(folder, manifest, segment)
             self._catalogue.write(manifest)
         except OSError:
-            self._catalogue.delete(manifest)
+            self._catalogue.discard(manifest)
             raise
         return manifest
 

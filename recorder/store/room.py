@@ -1,5 +1,6 @@
 """How much may still be written: the quota, the space that stays free, a reserve for closing files."""
 
+import errno
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -11,8 +12,16 @@ _MIN_FREE_SHARE: Final = 0.05
 RESERVE_BYTES: Final = 2 * 1024 * 1024
 """The index of a segment with some hundred channels takes some hundred KiB, a manifest less."""
 _RESERVE: Final = "reserve"
+_FULL: Final = (errno.ENOSPC, errno.EDQUOT)
+_TO_COME_WITHIN_S: Final = 30.0
+"""Btrfs frees when it commits: every 30 s by default (btrfs(5), "commit")."""
 _BLOCK: Final = 512
 """Unit of st_blocks (stat(2))."""
+
+
+def is_full(error: OSError) -> bool:
+    """Returns whether an error means that the disk, or this user's share of it, is full."""
+    return error.errno in _FULL
 
 
 @dataclass(frozen=True, slots=True)

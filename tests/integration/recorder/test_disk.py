@@ -1,5 +1,6 @@
 """What the disk does to a recorder: full, damaged, strange, shared with another one."""
 
+import errno
 import os
 import resource
 import shutil
@@ -14,8 +15,10 @@ import pytest
 from common.errors import NotFoundError, PreconditionError, TooMuchError, UserError
 from recorder.lifecycle import State
 from recorder.requests import StartOptions
+from recorder.store.folder import replace_file
 from recorder.store.lock import folder_lock
 from recorder.store.manifest import Copy, CopyState, Kind, Manifest, RecordingState, StopReason
+from recorder.values import GapCause
 from tests.support.recorder_in_process import Running, Source, numbers, running_recorder
 
 MIB = 1024 * 1024
@@ -271,3 +274,151 @@ async def test_a_snapshot_cut_off_in_this_boot_does_not_grow_afterwards(tmp_path
         assert found.state is RecordingState.RECOVERED
         calendar_ms = found.ended_unix_ms - found.started_unix_ms
         assert running.readings.live(found).duration_ms == max(calendar_ms, 0)
+
+
+async def test_a_recording_can_be_deleted_on_a_disk_without_a_free_byte(small_disk: Path) -> None:
+    async with running_recorder(small_disk / "root") as running:
+        done = await recorded(running, MIB)
+        fill(small_disk, 0)
+        await running.operations.delete("1", done.id, done.sha256, force=False)
+        assert running.readings.recordings == []
+        assert not running.readings.folder_of(done).exists()
+
+
+async def test_a_start_on_a_full_disk_makes_whole_what_was_cut_off_and_then_room(
+    small_disk: Path,
+) -> None:
+    root = small_disk / "root"
+    old, cut = await cut_off(root)
+    fill(small_disk, 0)
+    async with running_recorder(root, boot_id="another") as running:
+        await running.until(lambda: running.readings.phase.state is State.IDLE)
+        found = running.readings.get(cut.id)
+        assert (found.state, found.messages) == (RecordingState.RECOVERED, 10)
+        assert running.readings.has(old.id), "what is cut off fits into the reserve"
+        assert (await running.operations.start("again", StartOptions())).recording
+        assert not running.readings.has(old.id)
+
+
+async def test_a_start_on_a_full_disk_without_a_reserve_deletes_as_ever(small_disk: Path) -> None:
+    root = small_disk / "root"
+    old, cut = await cut_off(root)
+    (root / "reserve").unlink()
+    fill(small_disk, 0)
+    async with running_recorder(root, boot_id="another") as running:
+        await running.until(lambda: running.readings.phase.state is State.IDLE)
+        assert running.readings.get(cut.id).state is RecordingState.RECOVERED
+        assert not running.readings.has(old.id)
+
+
+@pytest.mark.parametrize("deleted", [0, 1, 2])
+async def test_a_deletion_that_was_cut_off_is_gone_on_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, deleted: int
+) -> None:
+    async with running_recorder(tmp_path) as running:
+        done = await recorded(running)
+        unlink, left = Path.unlink, iter(range(deleted))
+
+        def cut(path: Path, missing_ok: bool = False) -> None:
+            if done.id in path.parts and next(left, None) is None:
+                raise OSError(errno.EIO, "as if the power were gone")
+            unlink(path, missing_ok=missing_ok)
+
+        with monkeypatch.context() as patched:
+            patched.setattr(Path, "unlink", cut)
+            with pytest.raises(OSError, match="as if"):
+                await running.operations.delete("1", done.id, b"", force=False)
+    async with running_recorder(tmp_path) as running:
+        assert running.readings.recordings == []
+        assert not running.readings.folder_of(done).exists()
+
+
+async def cut_off(root: Path) -> tuple[Manifest, Manifest]:
+    """Two recordings: one that has ended, and one as it is left when the power is cut."""
+    async with running_recorder(root) as running:
+        old = await recorded(running, 8 * MIB)
+        await running.operations.start("cut", StartOptions())
+        Source(running.queue).send(10)
+        await running.written(10)
+        cut = running.readings.running
+        assert cut
+        (part,) = (running.readings.folder_of(cut) / "data").glob("*.part")
+        content = part.read_bytes()
+    for file in part.parent.iterdir():
+        file.unlink()
+    part.write_bytes(content)
+    cut.write(part.parent.parent)
+    return old, cut
+
+
+async def test_a_file_that_the_disk_refuses_costs_no_other_recording(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, cut = await cut_off(tmp_path)
+
+    def broken(part: Path) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO), str(part))
+
+    with monkeypatch.context() as patched:
+        patched.setattr("recorder.store.salvage.recover", broken)
+        async with running_recorder(tmp_path, boot_id="another") as running:
+            assert running.readings.phase.state is State.IDLE
+            found = running.readings.get(cut.id)
+            assert (found.state, found.messages) == (RecordingState.RECOVERED, 0)
+            assert GapCause.DISK in {gap.cause for gap in found.gaps}
+            assert (await recorded(running, 3000)).messages == 10
+    async with running_recorder(tmp_path, boot_id="another") as running:
+        assert running.readings.get(cut.id).messages == 10, "the disk reads it again"
+
+
+async def test_a_recording_that_the_disk_refuses_to_complete_is_set_aside(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old, cut = await cut_off(tmp_path)
+
+    def forbidden(path: Path, content: bytes) -> None:
+        if cut.id in path.parts:
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+        replace_file(path, content)
+
+    monkeypatch.setattr("recorder.store.salvage.replace_file", forbidden)
+    monkeypatch.setattr("recorder.store.manifest.replace_file", forbidden)
+    async with running_recorder(tmp_path, boot_id="another") as running:
+        assert running.readings.phase.state is State.IDLE
+        assert running.readings.get(cut.id).state is RecordingState.FAULTED
+        assert f"recording {cut.id} can't be completed: Permission denied" in running.readings.last_error
+        assert running.readings.get(old.id).state is RecordingState.COMPLETE
+        assert (await recorded(running, 3000)).messages == 10
+        await running.operations.delete("1", cut.id, b"", force=False)
+        assert running.readings.last_error == ""
+
+
+async def test_an_unfinished_file_whose_final_name_is_taken_is_kept_aside(tmp_path: Path) -> None:
+    async with running_recorder(tmp_path) as running:
+        done = await recorded(running)
+    data = tmp_path / "recordings" / done.id / "data"
+    shutil.copy(data / "000000.mcap", data / "000000.mcap.part")
+    (data / "000000.mcap.damaged").write_text("an earlier one", encoding="utf-8")
+    async with running_recorder(tmp_path) as running:
+        assert running.readings.phase.state is State.IDLE
+        found = running.readings.get(done.id)
+        assert (found.messages, found.segments) == (10, done.segments)
+        assert GapCause.DISK in {gap.cause for gap in found.gaps}
+        assert (data / "000000.mcap.damaged").read_text(encoding="utf-8") == "an earlier one"
+        assert (data / "000000.mcap.damaged.1").exists()
+        await running.operations.delete("1", done.id, b"", force=False)
+    assert not data.exists()
+
+
+async def test_the_number_of_a_damaged_file_is_not_used_again(tmp_path: Path) -> None:
+    _, cut = await cut_off(tmp_path)
+    data = tmp_path / "recordings" / cut.id / "data"
+    (data / "000000.mcap").write_bytes(b"damaged")
+    (data / "000000.mcap.part").unlink()
+    async with running_recorder(tmp_path) as running:
+        await running.until(lambda: running.readings.phase.state is State.RECORDING)
+        Source(running.queue).send(10)
+        done = (await running.operations.stop("stop", "")).recording
+        assert done
+        assert [segment.name for segment in done.segments] == ["data/000001.mcap"]
+    assert (data / "000000.mcap").read_bytes() == b"damaged"
