@@ -231,6 +231,7 @@ class Operations:
         now_ns = time.time_ns()
         return Manifest(
             id=new_id(now_ns / _NS_PER_S),
+            ordinal=self._parts.catalogue.next_ordinal,
             label=options.label,
             notes=options.notes,
             kind=Kind.MANUAL,

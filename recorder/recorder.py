@@ -183,7 +183,7 @@ class Recorder:
             raise RuntimeError("the writer has ended by a defect; see above")
         await self.take_reports()
         if self._life.retry_due:
-            await (self._retry() if self._life.state is State.FAULTED else self._open_ring())
+            await (self._retry() if self._life.state is State.FAULTED else self._retry_ring())
         if self._manual.at_its_limit:
             await self.end(StopReason.LIMIT)
         if self._ring:
@@ -233,14 +233,25 @@ class Recorder:
         await self._open_ring()
 
     async def _keep_room(self) -> None:
+        """Makes room for what is written. The ring alone deletes no recording: it gives way itself."""
         housekeeping = self._parts.housekeeping
         await housekeeping.measure()
         need = max(LEAST_ROOM, int(self._outputs.bytes_per_s * _AHEAD_S))
-        if not self._outputs.all or housekeeping.room.bytes >= need or await housekeeping.make_room(need):
+        if not self._outputs.all or housekeeping.room.bytes >= need:
+            return
+        if await housekeeping.make_room(need, recordings=self._outputs.recording is not None):
             return
         if self._life.state is State.RECORDING:
             await self.end(StopReason.DISK)
             self._life.stopped_for_room()
+        elif self._ring:
+            await self.finish_snapshots(self._ring.due(all_of_them=True), StopReason.DISK)
+
+    async def _retry_ring(self) -> None:
+        """Tries whether the ring can be written again; a full disk may need its own room."""
+        if self._ring and not self._outputs.ring:
+            await self._parts.housekeeping.make_room(LEAST_ROOM, recordings=False)
+            await self._open_ring()
 
     async def _open_ring(self) -> None:
         faulted = self._life.state in (State.FAULTED, State.RECOVERING)

@@ -190,6 +190,7 @@ class RingRecorder:
         pre_ns, post_ns = pre_s * _NS_PER_S, post_s * _NS_PER_S
         manifest = Manifest(
             id=new_id(calendar_ns / _NS_PER_S),
+            ordinal=self._catalogue.next_ordinal,
             label=label,
             kind=kind,
             state=RecordingState.RECORDING,

@@ -60,6 +60,11 @@ class Catalogue:
         """Returns a recording; None if there is no such."""
         return self._manifests.get(recording_id)
 
+    @property
+    def next_ordinal(self) -> int:
+        """The ordinal of the next recording."""
+        return max((each.ordinal + 1 for each in self._manifests.values()), default=1)
+
     def folder_of(self, manifest: Manifest) -> Path:
         """Returns the folder of a recording."""
         return self._folder / manifest.id

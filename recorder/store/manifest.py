@@ -121,6 +121,8 @@ class Manifest(_Part):
 
     Attributes:
         id: as RecordingService defines it.
+        ordinal: greater than that of all recordings that were made before on this disk, whatever the calendar
+            said; 0 if unknown.
         trigger: who or what caused a snapshot or an incident.
         max_duration_s, max_bytes: where it stops by itself; 0 for no limit.
         numbered: whether the middleware numbers the messages, so that losses can be counted.
@@ -131,6 +133,7 @@ class Manifest(_Part):
     """
 
     id: str = Field(pattern=f"^{ID.pattern}$")
+    ordinal: int = Field(default=0, ge=0)
     label: str = ""
     notes: str = ""
     kind: Kind

@@ -14,7 +14,7 @@ import pytest
 
 from common.errors import NotFoundError, PreconditionError, TooMuchError, UserError
 from recorder.lifecycle import State
-from recorder.requests import StartOptions
+from recorder.requests import SnapshotOptions, StartOptions
 from recorder.store.folder import replace_file
 from recorder.store.lock import folder_lock
 from recorder.store.manifest import Copy, CopyState, Kind, Manifest, RecordingState, StopReason
@@ -422,3 +422,40 @@ async def test_the_number_of_a_damaged_file_is_not_used_again(tmp_path: Path) ->
         assert done
         assert [segment.name for segment in done.segments] == ["data/000001.mcap"]
     assert (data / "000000.mcap").read_bytes() == b"damaged"
+
+
+async def test_the_ring_alone_deletes_no_recording_for_what_others_have_written(small_disk: Path) -> None:
+    """A program that fills the disk with its log would cost the robot all recordings, and gain nothing."""
+    room = {"min_free_bytes": 8 * MIB}
+    async with running_recorder(small_disk / "root", room=room, ring={"preset": "all"}) as running:
+        done = await recorded(running, MIB)
+        made = await running.operations.snapshot("1", SnapshotOptions(pre_s=10, post_s=600), "someone")
+        assert made.recording
+        ballast = fill(small_disk, 6 * MIB)
+        # It ends with what it has.
+        await running.until(lambda: not running.readings.snapshots_pending)
+        snapshot = running.readings.get(made.recording.id)
+        assert (snapshot.stop_reason, snapshot.messages) == (StopReason.DISK, 10)
+        assert running.readings.has(done.id)
+        ballast.unlink()
+        ballast = fill(small_disk, 0)
+        Source(running.queue).send(10, size=MIB)
+        await running.until(lambda: "the ring can't be written" in running.readings.last_error)
+        assert running.readings.has(done.id)
+        assert running.readings.phase.state is State.IDLE
+        # Also by itself when there is room again.
+        ballast.unlink()
+        await running.until(lambda: running.readings.writes)
+        assert running.readings.last_error == ""
+
+
+async def test_a_copy_that_shares_its_blocks_is_not_deleted_in_vain(small_disk: Path) -> None:
+    room = {"min_free_bytes": 8 * MIB}
+    async with running_recorder(small_disk / "root", room=room) as running:
+        shared, other = await recorded(running, MIB), await recorded(running, MIB + 1)
+        for file in (running.readings.folder_of(shared) / "data").iterdir():
+            (small_disk / file.name).hardlink_to(file)
+        fill(small_disk, 11 * MIB + MIB // 2)
+        await running.operations.start("a", StartOptions())
+        assert running.readings.has(shared.id)
+        assert not running.readings.has(other.id)
