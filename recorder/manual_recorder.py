@@ -142,11 +142,14 @@ class ManualRecorder:
         if running is None:
             return
         now_ns = time.time_ns()
-        failed = _at_end(running, output.progress if output else Progress()).model_copy(
+        progress = output.progress if output else Progress(last_ns=now_ns)
+        # What came after the newest flush was lost with the buffers.
+        lost = Gap("", GapCause.DISK, min(progress.last_ns, now_ns), now_ns, None)
+        failed = _at_end(running, progress).model_copy(
             update={
                 "state": RecordingState.FAULTED,
                 "stop_reason": StopReason.DISK if full else StopReason.ERROR,
-                "gaps": (*running.gaps, Gap("", GapCause.DISK, now_ns, now_ns, None)),
+                "gaps": (*running.gaps, lost),
             }
         )
         await asyncio.to_thread(self._reserve.give)

@@ -264,8 +264,7 @@ class Recorder:
 
     def _ring_failed(self, error: OSError) -> None:
         assert self._ring, "it has failed"  # noqa: S101  # for the type checker
-        self._outputs.ring = None
-        self._ring.problem = f"the ring can't be written: {error.strerror}; it is tried again by itself"
+        self._ring.fail(error)
         # A full disk is no fault: a recording that begins may delete older ones, which the ring may not.
         if self._life.state is State.IDLE and not is_full(error):
             self._life.fault(self._ring.problem)

@@ -3,8 +3,9 @@
 import asyncio
 import logging
 import time
+from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,6 +20,7 @@ from recorder.store.housekeeping import Housekeeping, attempt
 from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason
 from recorder.store.ring import SEGMENT_S, Ring, RingSegment, link_next
 from recorder.store.salvage import ended
+from recorder.values import Gap, GapCause
 from recorder.writing.output import Closed, Output, Shape
 from recorder.writing.writer import Writer
 
@@ -26,6 +28,7 @@ _log = logging.getLogger(__name__)
 
 MAX_SNAPSHOTS: Final = 16
 _LONGEST_TRIGGER: Final = 1000
+_MAX_OUTAGES: Final = 100
 _NS_PER_S: Final = 1_000_000_000
 _NS_PER_MS: Final = 1_000_000
 
@@ -79,6 +82,9 @@ class RingRecorder:
         self._boot_id = boot_id
         self._run_id = run_id
         self._pending: list[_Snapshot] = []
+        self._outages: deque[Gap] = deque(maxlen=_MAX_OUTAGES)
+        """When nothing was written to the ring; of the last one that lasts, the end is its begin."""
+        self._down = False
         self.problem = ""
         incidents = settings.incidents
         self._incidents = Incidents(
@@ -131,10 +137,46 @@ class RingRecorder:
         """
         for segment in await asyncio.to_thread(self._ring.recover):
             await self._link(segment)
+        if not self._outages and self._ring.newest_ns:
+            # A former process has left it.
+            self._goes_down(GapCause.INTERRUPTED, self._ring.newest_ns)
         output = Output(self.shape(), self._writer.head, closed)
         await asyncio.wrap_future(self._writer.add(output))
         self._outputs.ring = output
+        self._goes_on()
+
+    def fail(self, error: OSError) -> None:
+        """Takes note that the disk has failed it; snapshots of this time have a gap."""
+        output, self._outputs.ring = self._outputs.ring, None
+        self.problem = f"the ring can't be written: {error.strerror}; it is tried again by itself"
+        if not self._down:
+            self._goes_down(GapCause.DISK, output.progress.last_ns if output else time.time_ns())
+
+    def _goes_down(self, cause: GapCause, since_ns: int) -> None:
+        self._down = True
+        self._outages.append(Gap("", cause, since_ns, since_ns, None))
+
+    def _goes_on(self) -> None:
         self.problem = ""
+        if self._down:
+            self._down = False
+            self._outages.append(self._lasting(self._outages.pop()))
+
+    @staticmethod
+    def _lasting(outage: Gap) -> Gap:
+        return replace(outage, ended_ns=max(outage.began_ns, time.time_ns()))
+
+    def _gaps_within(self, window_ns: tuple[int, int]) -> tuple[Gap, ...]:
+        """Returns what is missing of the ring between two instants of the calendar clock."""
+        from_ns, until_ns = window_ns
+        outages = list(self._outages)
+        if self._down:
+            outages[-1] = self._lasting(outages[-1])
+        return tuple(
+            replace(each, began_ns=max(each.began_ns, from_ns), ended_ns=min(each.ended_ns, until_ns))
+            for each in outages
+            if each.began_ns < until_ns and each.ended_ns > from_ns
+        )
 
     async def close(self) -> None:
         """Makes the last segment final."""
@@ -227,7 +269,7 @@ class RingRecorder:
         if pending:
             made = pending[-1].id
             pending[-1].until_ns = time.monotonic_ns() + configured.post_s * _NS_PER_S
-            await self._add_trigger(made, fault_id)
+            await self._merge(made, fault_id)
         else:
             trigger = f"{fault_id}: {message}" if message else fault_id
             try:
@@ -273,6 +315,8 @@ class RingRecorder:
         output = self._outputs.ring
         numbered = output.progress.numbered if output else manifest.numbered
         update: dict[str, Any] = {"ended_unix_ms": now_ms, "ended_monotonic_ns": now_ns, "numbered": numbered}
+        if manifest.window_ns:
+            update["gaps"] = (*manifest.gaps, *self._gaps_within(manifest.window_ns))
         firsts = [each.first_ns for each in manifest.segments if each.first_ns is not None]
         if firsts:
             began_ms = min(firsts) // _NS_PER_MS
@@ -280,10 +324,14 @@ class RingRecorder:
             update["started_monotonic_ns"] = max(now_ns - max(now_ms - began_ms, 0) * _NS_PER_MS, 0)
         return manifest.model_copy(update=update)
 
-    async def _add_trigger(self, recording_id: str, fault_id: str) -> None:
-        if before := self._catalogue.get(recording_id):
+    async def _merge(self, recording_id: str, fault_id: str) -> None:
+        """Notes in an incident's manifest one more fault, and that it lasts longer for it."""
+        before = self._catalogue.get(recording_id)
+        if before and before.window_ns:
             trigger = f"{before.trigger}; {fault_id}"[:_LONGEST_TRIGGER]
-            await self._keep(before.model_copy(update={"trigger": trigger}))
+            until_ns = time.time_ns() + self._settings.incidents.post_s * _NS_PER_S
+            update = {"trigger": trigger, "window_ns": (before.window_ns[0], until_ns)}
+            await self._keep(before.model_copy(update=update))
 
     async def _link(self, segment: RingSegment) -> None:
         """Adds a segment to the snapshots that it belongs to."""

@@ -59,12 +59,21 @@ class Ring:
         self.directory = directory
         self._kept_ns = seconds * 1_000_000_000
         self._next_number = 0
+        self._loaded_ns = 0
+        self._left = 0
+        """Segments with lower numbers are of a former process."""
         self.segments: list[RingSegment] = []
 
     @property
     def next_number(self) -> int:
         """The number of the segment to begin next."""
         return self._next_number
+
+    @property
+    def newest_ns(self) -> int:
+        """The log time of the newest message; 0 without one."""
+        lasts = [each.summary.last_ns for each in self.segments if each.summary.last_ns is not None]
+        return max(lasts, default=0)
 
     @staticmethod
     def name(number: int) -> str:
@@ -82,6 +91,7 @@ class Ring:
         for path in files_named(self.directory, _NAME):
             self._take(path, summarise)
         self.recover()
+        self._loaded_ns, self._left = time.monotonic_ns(), self._next_number
 
     def recover(self) -> list[RingSegment]:
         """Makes segments whole that were cut off, and returns them.
@@ -100,8 +110,12 @@ class Ring:
         self._next_number = max(self._next_number, segment.number + 1)
 
     def outdated(self, now_ns: int) -> list[RingSegment]:
-        """Returns the segments that are older than what is kept."""
-        return [each for each in self.segments if each.ended_ns < now_ns - self._kept_ns]
+        """Returns the segments that are older than what is kept.
+
+        What a former process has left is kept for as long from the start on: it is what led to a power cut.
+        """
+        since_ns = now_ns - self._kept_ns
+        return [each for each in self.segments if self._kept_from_ns(each) < since_ns]
 
     def drop(self, segment: RingSegment) -> None:
         """Deletes a segment; snapshots that have it keep it.
@@ -131,6 +145,9 @@ class Ring:
         """Returns how far back the ring reaches."""
         segments = list(self.segments)
         return now_ns - segments[0].began_ns if segments else 0
+
+    def _kept_from_ns(self, segment: RingSegment) -> int:
+        return max(segment.ended_ns, self._loaded_ns) if segment.number < self._left else segment.ended_ns
 
     def _take(self, path: Path, summary_of: Callable[[Path], SegmentSummary | None]) -> RingSegment | None:
         number = int(path.name[:8])

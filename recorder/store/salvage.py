@@ -140,9 +140,16 @@ def _salvaged(
 
 
 def _interrupted(catalogue: Catalogue, manifest: Manifest) -> None:
-    cut = manifest if manifest.window_ns else with_interruption(manifest, None)
+    cut = _with_rest_of_window(manifest) if manifest.window_ns else with_interruption(manifest, None)
     folder = catalogue.folder_of(manifest)
     catalogue.write(ended(folder, cut, RecordingState.RECOVERED, StopReason.INTERRUPTED))
+
+
+def _with_rest_of_window(manifest: Manifest) -> Manifest:
+    """Returns a snapshot's manifest with a gap from its newest message to the end of its window."""
+    _, until_ns = manifest.window_ns or (0, 0)
+    complete = any((each.last_ns or 0) >= until_ns for each in manifest.segments)
+    return manifest if complete else with_interruption(manifest, until_ns)
 
 
 def with_interruption(manifest: Manifest, until_ns: int | None) -> Manifest:
@@ -150,7 +157,8 @@ def with_interruption(manifest: Manifest, until_ns: int | None) -> Manifest:
 
     Args:
         manifest: of a recording that was cut off.
-        until_ns: when it goes on, by the calendar clock; None: never, and how much is missing is unknown.
+        until_ns: when it goes on, or was to end, by the calendar clock; None: never, and how much is missing
+            is unknown.
     """
     lasts = [each.last_ns for each in manifest.segments if each.last_ns is not None]
     began_ns = max(lasts, default=manifest.started_unix_ms * _NS_PER_MS)

@@ -18,7 +18,7 @@ from recorder.requests import SnapshotOptions, StartOptions
 from recorder.store.folder import replace_file
 from recorder.store.lock import folder_lock
 from recorder.store.manifest import Copy, CopyState, Kind, Manifest, RecordingState, StopReason
-from recorder.values import GapCause
+from recorder.values import Gap, GapCause
 from tests.support.recorder_in_process import Running, Source, numbers, running_recorder
 
 MIB = 1024 * 1024
@@ -138,6 +138,69 @@ async def test_an_error_of_the_disk_ends_the_recording_and_it_records_again_by_i
         assert found == list(range(1, len(found) + 1))
         assert len(found) >= 100
         assert (await running.operations.start("3", StartOptions())).recording
+
+
+async def test_the_gap_of_a_failed_disk_covers_what_was_buffered(tmp_path: Path) -> None:
+    async with running_recorder(tmp_path) as running:
+        await running.operations.start("1", StartOptions())
+        source = Source(running.queue)
+        source.send(100)
+        await running.written(100)
+        with files_of_at_most(200_000):
+            handed_ns = time.time_ns()
+            source.send(100, size=20_000)
+            await running.until(lambda: running.readings.running is None)
+        cut = running.readings.newest
+        assert cut
+        (gap,) = [each for each in cut.gaps if each.cause is GapCause.DISK]
+        assert gap.began_ns <= handed_ns < gap.ended_ns
+
+
+async def test_a_snapshot_tells_when_the_ring_could_not_be_written(tmp_path: Path) -> None:
+    async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
+        await running.until(lambda: running.readings.writes)
+        source = Source(running.queue)
+        source.send(10)
+        made = await running.operations.snapshot("1", SnapshotOptions(pre_s=10, post_s=3), "someone")
+        assert made.recording
+        with files_of_at_most(100_000):
+            handed_ns = time.time_ns()
+            source.send(100, size=20_000)
+            await running.until(lambda: "the ring can't be written" in running.readings.last_error)
+        await running.until(lambda: not running.readings.snapshots_pending)
+        found = running.readings.get(made.recording.id)
+        (gap,) = [each for each in found.gaps if each.cause is GapCause.DISK]
+        assert gap.began_ns <= handed_ns < gap.ended_ns
+
+
+async def test_a_snapshot_over_a_restart_tells_of_it(tmp_path: Path) -> None:
+    ring = {"preset": "all"}
+    async with running_recorder(tmp_path, ring=ring) as running:
+        await running.until(lambda: running.readings.writes)
+        Source(running.queue).send(10)
+    async with running_recorder(tmp_path, ring=ring) as running:
+        await running.until(lambda: running.readings.writes)
+        Source(running.queue, sent=10).send(10)
+        made = await running.operations.snapshot("1", SnapshotOptions(pre_s=60, post_s=0), "someone")
+        await running.until(lambda: not running.readings.snapshots_pending)
+        assert made.recording
+        found = running.readings.get(made.recording.id)
+        assert numbers(running.readings, found) == list(range(1, 21))
+        (gap,) = found.gaps
+        first, second = (each for each in found.segments if each.messages)
+        assert gap == Gap("", GapCause.INTERRUPTED, first.last_ns or 0, second.first_ns or 0, None)
+
+
+async def test_a_snapshot_that_was_cut_off_lacks_the_rest_of_its_window(tmp_path: Path) -> None:
+    async with running_recorder(tmp_path) as running:
+        done = await recorded(running)
+    last_ns = done.segments[-1].last_ns or 0
+    until_ns = last_ns + 1_000_000_000
+    cut = {"state": RecordingState.RECORDING, "kind": Kind.SNAPSHOT, "window_ns": (0, until_ns)}
+    done.model_copy(update=cut).write(tmp_path / "recordings" / done.id)
+    async with running_recorder(tmp_path) as running:
+        found = running.readings.get(done.id)
+        assert found.gaps == (Gap("", GapCause.INTERRUPTED, last_ns, until_ns, None),)
 
 
 @pytest.mark.parametrize("harm", [Path.unlink, lambda path: path.write_bytes(b"")], ids=["gone", "empty"])

@@ -2,11 +2,16 @@
 
 import errno
 import os
+import time
 from pathlib import Path
 
 import pytest
 
-from recorder.store.ring import link
+from recorder.mcap.writer import SegmentWriter
+from recorder.store.ring import Ring, link
+from tests.support.segments import string_sample
+
+NS_PER_S = 1_000_000_000
 
 
 @pytest.fixture
@@ -44,3 +49,16 @@ def test_where_there_are_no_links_it_is_a_copy(
     link(source, target)
     assert target.read_bytes() == b"a segment"
     assert not target.samefile(source)
+
+
+def test_what_was_left_an_hour_ago_is_kept_as_long_as_what_is_new(tmp_path: Path) -> None:
+    """What led to a power cut is wanted when the robot is on again."""
+    writer = SegmentWriter(tmp_path / "00000007.mcap.part")
+    writer.write(string_sample(1))
+    writer.finish()
+    ring = Ring(tmp_path, seconds=60)
+    ring.load()
+    now_ns = time.monotonic_ns()
+    assert ring.outdated(now_ns + 59 * NS_PER_S) == []
+    assert ring.outdated(now_ns + 61 * NS_PER_S) == ring.segments
+    assert ring.next_number == 8
