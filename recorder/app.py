@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import secrets
+from contextlib import ExitStack
 
 from common import bind, heartbeat, rpc
 from common.boot import boot_id
@@ -34,7 +35,9 @@ async def serve(settings: RecorderSettings, stop: asyncio.Event) -> None:
     # Before there are other threads: each begins with the priority of the one that starts it.
     step_back()
     queue = SampleQueue(settings.queue_bytes)
-    with folder_lock(settings.root):
+    with ExitStack() as locks:
+        for folder in dict.fromkeys(each.resolve() for each in settings.folders):
+            locks.enter_context(folder_lock(folder))
         async with RobotSources(settings, queue) as sources:
             parts = parts_of(
                 settings,

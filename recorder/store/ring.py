@@ -169,6 +169,15 @@ class Ring:
         return segment
 
 
+def has_segments(folder: Path) -> bool:
+    """Returns whether a folder has segments of a ring, or unfinished ones.
+
+    Raises:
+        OSError: it can't be read.
+    """
+    return any(_NAME.fullmatch(path.name.removesuffix(PART)) for path in folder.iterdir())
+
+
 def link(source: Path, target: Path) -> None:
     """Gives a file a second name; a copy where the file system has none, or the two are in different ones.
 
