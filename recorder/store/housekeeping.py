@@ -46,6 +46,8 @@ class Housekeeping:
         self._ring = ring
         self._limits = Limits(settings.room.quota_bytes, settings.room.min_free_bytes)
         self._to_come = RoomToCome()
+        self._summed_at = -1
+        self._deletable_bytes = 0
         self.room = Room()
 
     async def measure(self) -> Room:
@@ -91,6 +93,19 @@ class Housekeeping:
                 Reason.DISK_FULL,
             )
 
+    @property
+    def deletable_bytes(self) -> int:
+        """What recordings take that may be deleted to make room; a file that several share counts once."""
+        if self._summed_at != self._catalogue.revision:
+            self._summed_at, self._deletable_bytes = self._catalogue.revision, self._sum_of_deletable()
+        return self._deletable_bytes
+
+    def _sum_of_deletable(self) -> int:
+        recordings = list(self._catalogue.all.values())
+        kept = {file.sha256 for each in recordings if not _may_go(each) for file in each.files}
+        going = {file.sha256: file.size for each in recordings if _may_go(each) for file in each.files}
+        return sum(size for sha256, size in going.items() if sha256 not in kept)
+
     def _measured(self) -> Room:
         disk = disk_of(self._settings.root)
         used = used_bytes(self._settings.folders) if self._limits.quota_bytes else 0
@@ -129,6 +144,10 @@ class Housekeeping:
             self._catalogue.delete(manifest)
             return True
         return self._ring is not None and self._ring.drop_named(each.name)
+
+
+def _may_go(manifest: Manifest) -> bool:
+    return not (manifest.state.open or manifest.pinned or manifest.copied.outstanding)
 
 
 async def attempt(otherwise: str, work: Callable[[], _T]) -> _T | None:

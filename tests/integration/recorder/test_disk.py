@@ -522,3 +522,27 @@ async def test_a_copy_that_shares_its_blocks_is_not_deleted_in_vain(small_disk: 
         await running.operations.start("a", StartOptions())
         assert running.readings.has(shared.id)
         assert not running.readings.has(other.id)
+
+
+async def test_the_room_that_is_told_has_what_older_recordings_make(small_disk: Path) -> None:
+    """A robot that has recorded for weeks is always at its limit, and can record as long as ever."""
+    async with running_recorder(small_disk / "root") as running:
+        one, pinned = await recorded(running, 8 * MIB), await recorded(running, 4 * MIB)
+        await running.operations.pin("pin", pinned.id, pinned=True)
+        ballast = fill(small_disk, 5 * MIB)
+        await running.operations.start("1", StartOptions())
+        source = Source(running.queue)
+
+        def told() -> float:
+            source.send(size=1000)
+            return running.readings.room_s or 0.0
+
+        await running.until(told)
+        told_bytes = (running.readings.room_s or 0.0) * running.readings.bytes_per_s
+        assert one.size + 4 * MIB < told_bytes < one.size + 6 * MIB
+        await running.operations.stop("2", "")
+        assert not running.readings.disk_short
+        ballast.unlink()
+        fill(small_disk, 0)
+        await running.operations.pin("pin too", one.id, pinned=True)
+        await running.until(lambda: running.readings.disk_short)
