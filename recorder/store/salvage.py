@@ -80,13 +80,16 @@ def _without(manifest: Manifest, part: Path) -> Manifest:
 def ended(folder: Path, manifest: Manifest, state: RecordingState, reason: StopReason) -> Manifest:
     """Returns the manifest of a recording that has ended, and writes rosbag2's file beside its segments.
 
+    A copy has that file, and the manifest not: what else is known of the recording is in both.
+
     Raises:
         OSError: the disk is full or fails.
     """
-    text = metadata(manifest.summaries(folder)).encode()
+    update = {"state": state, "stop_reason": reason}
+    done = _until_next_messages(manifest.model_copy(update=update)).spanning()
+    text = metadata(done.summaries(folder), done.about).encode()
     replace_file(folder / METADATA, text)
-    update = {"state": state, "stop_reason": reason, "metadata": file_of(METADATA, text)}
-    return _until_next_messages(manifest.model_copy(update=update)).spanning()
+    return done.model_copy(update={"metadata": file_of(METADATA, text)})
 
 
 def salvage(catalogue: Catalogue, ring: Iterable[RingSegment], boot_id: str) -> Manifest | None:

@@ -1,16 +1,20 @@
 """A recording from start to stop, on a real disk, with messages of the test's own."""
 
+import json
+import shutil
 import threading
 import time
 from pathlib import Path
 
 import pytest
+import yaml
 from rosbags.rosbag2 import Reader
 
 from common.errors import InvalidRequestError, NotFoundError, PreconditionError
 from recorder.lifecycle import State
 from recorder.requests import SnapshotOptions, StartOptions
 from recorder.store.manifest import Kind, RecordingState, StopReason
+from recorder.values import GapCause, Loss
 from recorder.writing.output import Output
 from tests.support.recorder_in_process import Source, channel, numbers, running_recorder
 
@@ -169,3 +173,28 @@ async def test_deleting_needs_a_reason_that_is_good_enough(tmp_path: Path) -> No
         assert (await running.operations.delete("6", done.id, done.sha256, force=True)).message
         with pytest.raises(NotFoundError):
             await running.operations.delete("7", done.id, b"", force=False)
+
+
+async def test_a_copy_tells_what_the_manifest_knows(tmp_path: Path) -> None:
+    """The files of a recording are copied, its manifest is not."""
+    options = StartOptions(label="lap 1", notes="wet: floor\n- and dark")
+    async with running_recorder(tmp_path) as running:
+        await running.operations.start("1", options)
+        source = Source(running.queue)
+        source.send()
+        running.queue.put([Loss(source.of, GapCause.MIDDLEWARE, 5, 7, 3)])
+        done = (await running.operations.stop("2", "")).recording
+        assert done
+        copied = tmp_path / "copy"
+        for file in done.files:
+            (copied / file.name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(running.readings.folder_of(done) / file.name, copied / file.name)
+    with Reader(copied / "data") as bag:
+        assert bag.message_count == 1
+    content = yaml.safe_load((copied / "data" / "metadata.yaml").read_text(encoding="utf-8"))
+    about = content["rosbag2_bagfile_information"]["custom_data"]
+    assert (about["id"], about["label"], about["notes"]) == (done.id, options.label, options.notes)
+    assert (about["state"], about["stop_reason"], about["preset"]) == ("complete", "requested", "all")
+    gap = {"topic": "/odom", "cause": "middleware", "began_ns": "5", "ended_ns": "7", "messages": "3"}
+    assert json.loads(about["gaps"]) == [gap]
+    assert all(isinstance(text, str) for text in about.values()), "rosbag2 reads nothing else"
