@@ -188,7 +188,7 @@ class Operations:
     # --- parts of operations ---
 
     def _earlier(self, method: str, request_id: str) -> Result | None:
-        answer = self._parts.state_file.answered(method, request_id, time.time())
+        answer = self._parts.state_file.answered(method, request_id, time.monotonic())
         return Result(answer.message, self._parts.catalogue.get(answer.recording_id)) if answer else None
 
     async def _answer(self, method: str, request_id: str, message: str, recording: Manifest | None) -> Result:
@@ -196,7 +196,8 @@ class Operations:
             method=method,
             recording_id=recording.id if recording else "",
             message=message,
-            at_s=time.time(),
+            at_s=time.monotonic(),
+            boot_id=self._parts.boot_id,
         )
         state_file = self._parts.state_file
         state_file.remember(request_id, answer)

@@ -54,9 +54,15 @@ class SegmentWriter:
         self._last_ns: int | None = None
         self._messages = 0
         self._gaps: list[Gap] = []
-        self._mcap.start(profile=PROFILE, library=f"robot-gateway {project_version()}")
-        for each in head:
-            self.note(each)
+        try:
+            self._mcap.start(profile=PROFILE, library=f"robot-gateway {project_version()}")
+            for each in head:
+                self.note(each)
+        except OSError:
+            # Nobody gets the object that would be abandoned, and nothing is in the file.
+            self.abandon()
+            path.unlink(missing_ok=True)
+            raise
 
     @property
     def size(self) -> int:

@@ -144,12 +144,19 @@ class Writer:
             jobs = len(self._jobs)
             for item in self._queue.take(0.0 if jobs else max(0.0, flush_at_s - time.monotonic())):
                 self._write(item)
+                # Also within what has waited: on a slow disk it takes seconds.
+                flush_at_s = self._flush_if_due(flush_at_s)
             for _ in range(jobs):
                 self._jobs[0].run()
                 self._jobs.popleft()
-            if time.monotonic() >= flush_at_s:
-                self._each(Output.flush, *self._outputs)
-                flush_at_s = time.monotonic() + FLUSH_S
+            flush_at_s = self._flush_if_due(flush_at_s)
+
+    def _flush_if_due(self, at_s: float) -> float:
+        """Flushes all outputs when it is due; returns when it is due next."""
+        if time.monotonic() < at_s:
+            return at_s
+        self._each(Output.flush, *self._outputs)
+        return time.monotonic() + FLUSH_S
 
     def _write(self, item: Item) -> None:
         if isinstance(item, Sample):

@@ -1,6 +1,7 @@
 """What no disk and no publisher should do to a recorder, and what becomes of a defect of its own."""
 
 import asyncio
+import threading
 import time
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from recorder.mcap.reading import messages
 from recorder.requests import StartOptions
 from recorder.values import Item, Sample
 from recorder.writing.output import Output
-from recorder.writing.writer import WriterEndedError
+from recorder.writing.writer import FLUSH_S, WriterEndedError
 from tests.support.recorder_in_process import Source, channel, running_recorder
 
 WITHIN_S = 10.0
@@ -48,3 +49,30 @@ async def test_a_defect_of_the_writer_ends_the_recorder_and_leaves_no_operation_
 
     with pytest.raises(RuntimeError, match="the writer has ended"):
         await record()
+
+
+async def test_what_has_waited_is_flushed_in_between(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the disk is slow, what has waited takes seconds: a kill would cost all of them."""
+    writes, flushes = Output.write, Output.flush
+    done: list[str] = []
+
+    def slow(output: Output, item: Item) -> None:
+        threading.Event().wait(FLUSH_S / 4)
+        writes(output, item)
+        done.append("written")
+
+    def counted(output: Output) -> None:
+        flushes(output)
+        done.append("flushed")
+
+    async with running_recorder(tmp_path) as running:
+        await running.operations.start("1", StartOptions())
+        monkeypatch.setattr(Output, "write", slow)
+        monkeypatch.setattr(Output, "flush", counted)
+        source = Source(running.queue)
+        with running.queue._changed:  # the writer gets them as one
+            source.send(12)
+        await running.until(lambda: done.count("written") == 12)
+        first, last = done.index("written"), len(done) - done[::-1].index("written")
+        assert done[first:last].count("flushed") >= 2
+        await running.operations.stop("2", "")

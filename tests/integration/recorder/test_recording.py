@@ -62,6 +62,19 @@ async def test_requests_repeated_change_nothing_even_after_a_restart(tmp_path: P
         assert running.readings.phase.state is State.IDLE
 
 
+async def test_a_repeated_request_is_known_after_the_clock_was_set_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with running_recorder(tmp_path) as running:
+        first = await running.operations.start("1", StartOptions())
+        now = time.time
+        monkeypatch.setattr(time, "time", lambda: now() - 3600)
+        again = await running.operations.start("1", StartOptions())
+        assert first.recording
+        assert again.recording
+        assert again.recording.id == first.recording.id
+
+
 async def test_limits_end_a_recording(tmp_path: Path) -> None:
     async with running_recorder(tmp_path) as running:
         await running.operations.start("1", StartOptions(max_duration_s=1))
