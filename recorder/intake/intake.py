@@ -27,7 +27,7 @@ from recorder.intake.qos import is_latched, offered_qos
 from recorder.intake.schemas import ENCODING, Schemas
 from recorder.intake.source import Source
 from recorder.intake.topics import Selects, selected
-from recorder.values import Channel, Item
+from recorder.values import Channel, Ended, Item
 
 _log = logging.getLogger(__name__)
 
@@ -228,7 +228,10 @@ class Intake:
 
     def _close(self, keys: Sequence[_Key]) -> None:
         for key in keys:
-            self._entries.pop(key).source.close()
+            source = self._entries.pop(key).source
+            source.close()
+            if source.channel.latched:
+                self._put([Ended(source.channel)])
         if keys:
             # Channels of topics that come back stay the same, but names are not collected for ever.
             for key in list(self._channels)[: max(0, len(self._channels) - _MAX_KNOWN)]:

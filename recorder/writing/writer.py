@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from typing import Any, Final, Protocol, TypeVar
 
-from recorder.values import Item, Note, Sample
+from recorder.values import Channel, Ended, Item, Note, Sample
 from recorder.writing.output import Head, Output
 from recorder.writing.queue import SampleQueue
 
@@ -33,6 +33,9 @@ class Latched(Protocol):
 
     def take(self, sample: Sample) -> None:
         """Takes a message of a latched topic."""
+
+    def forget(self, channel: Channel) -> None:
+        """Forgets the messages of a topic that is no longer taken."""
 
     def samples(self) -> Iterable[Sample]:
         """Returns the messages that a late subscriber would get."""
@@ -162,6 +165,9 @@ class Writer:
         if isinstance(item, Sample):
             if item.channel.latched:
                 self._latched.take(item)
+        elif isinstance(item, Ended):
+            self._latched.forget(item.channel)
+            return
         elif isinstance(item, Note) and (item.name in self._notes or len(self._notes) < _MAX_NOTES):
             self._notes[item.name] = item
         for output in tuple(self._outputs):

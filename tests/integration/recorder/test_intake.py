@@ -20,7 +20,7 @@ from std_msgs.msg import Int32, String
 from recorder.intake.intake import intake
 from recorder.mcap.rosbag2 import FILE_NAME, metadata
 from recorder.mcap.writer import SegmentWriter
-from recorder.values import Loss, Sample
+from recorder.values import Ended, Loss, Sample
 from tests.integration.recorder.conftest import Everything, Taken
 from tests.support.talker import Talker, talking
 from tests.support.waiting import wait_until
@@ -86,6 +86,16 @@ def test_latched_messages_reach_an_intake_that_comes_late(talker: Talker) -> Non
     (sample,) = [each for each in items if isinstance(each, Sample)]
     assert sample.channel.latched
     assert b"second" in sample.data
+
+
+def test_a_latched_topic_that_is_no_longer_taken_has_ended(talker: Talker, taken: Taken) -> None:
+    latched = {"durability": DurabilityPolicy.TRANSIENT_LOCAL, "depth": 1}
+    talker.publisher("/robot_description", String, **latched).publish(String(data="first"))
+    wait_until(lambda: taken.samples("/robot_description"), "the latched message")
+    taken.intake.want(frozenset({"nothing"}))
+    wait_until(lambda: any(isinstance(each, Ended) for each in list(taken.items)), "the end")
+    (ended,) = [each for each in taken.items if isinstance(each, Ended)]
+    assert ended.channel is taken.samples("/robot_description")[0].channel
 
 
 def test_qos_follows_publishers_that_join_later(talker: Talker, taken: Taken) -> None:

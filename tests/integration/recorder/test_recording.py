@@ -14,7 +14,7 @@ from common.errors import InvalidRequestError, NotFoundError, PreconditionError
 from recorder.lifecycle import State
 from recorder.requests import SnapshotOptions, StartOptions
 from recorder.store.manifest import Kind, RecordingState, StopReason
-from recorder.values import GapCause, Loss
+from recorder.values import Ended, GapCause, Loss
 from recorder.writing.output import Output
 from tests.support.recorder_in_process import Source, channel, numbers, running_recorder
 
@@ -97,6 +97,21 @@ async def test_a_long_recording_is_cut_into_segments_without_a_loss(tmp_path: Pa
         assert numbers(running.readings, done) == list(range(1, 61))
         # At the head of each segment.
         assert numbers(running.readings, done, "/tf_static") == [1] * len(done.segments)
+
+
+async def test_what_has_ended_is_not_repeated_at_the_head_of_a_segment(tmp_path: Path) -> None:
+    async with running_recorder(tmp_path) as running:
+        ended, lasting = (
+            Source(running.queue, channel(each, latched=True)) for each in ("/map", "/tf_static")
+        )
+        ended.send()
+        lasting.send()
+        running.queue.put([Ended(ended.of)])
+        await running.operations.start("1", StartOptions())
+        done = (await running.operations.stop("2", "")).recording
+        assert done
+        assert numbers(running.readings, done, "/tf_static") == [1]
+        assert numbers(running.readings, done, "/map") == []
 
 
 async def test_a_clock_that_steps_begins_a_segment(tmp_path: Path) -> None:
