@@ -202,6 +202,8 @@ class _Job:
     def __init__(self, work: Callable[[], Any]) -> None:
         self._work = work
         self.future: Future[Any] = Future()
+        # It is done in any case: who waits may leave, but takes nothing back.
+        self.future.set_running_or_notify_cancel()
 
     def run(self) -> None:
         """Does it. Any other error than the disk's is a defect, which ends the thread; see `Writer._run`."""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from recorder.lifecycle import State
 from recorder.mcap.reading import messages
 from recorder.requests import StartOptions
 from recorder.values import Item, Sample
@@ -76,3 +77,32 @@ async def test_what_has_waited_is_flushed_in_between(tmp_path: Path, monkeypatch
         first, last = done.index("written"), len(done) - done[::-1].index("written")
         assert done[first:last].count("flushed") >= 2
         await running.operations.stop("2", "")
+
+
+async def test_a_caller_that_leaves_a_start_leaves_no_half_recording(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its deadline may pass while a slow disk opens the first file."""
+    opening, released, opens = threading.Event(), threading.Event(), Output.open
+
+    def slow(output: Output) -> None:
+        opening.set()
+        released.wait(WITHIN_S)
+        opens(output)
+
+    async with running_recorder(tmp_path) as running:
+        with monkeypatch.context() as patched:
+            patched.setattr(Output, "open", slow)
+            call = asyncio.create_task(running.operations.start("1", StartOptions()))
+            await running.until(opening.is_set)
+            call.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await call
+            released.set()
+            await running.until(lambda: running.readings.phase.state is State.RECORDING)
+        Source(running.queue).send(10)
+        repeated = (await running.operations.start("1", StartOptions())).recording
+        done = (await running.operations.stop("2", "")).recording
+        assert repeated
+        assert done
+        assert (done.id, done.messages) == (repeated.id, 10)
