@@ -78,6 +78,7 @@ class Catalogue:
             OSError: the folder can't be read or written.
         """
         make_directory(self._folder)
+        self.problems.clear()
         for folder in sorted(self._folder.iterdir()):
             if not ID.fullmatch(folder.name) or folder.is_symlink() or not folder.is_dir():
                 continue
@@ -128,9 +129,12 @@ class Catalogue:
             OSError: the disk fails; the next start goes on.
         """
         folder = self.folder_of(manifest)
-        deletion.begin(folder)
+        there = folder.is_dir()  # Somebody may have deleted it by hand.
+        if there:
+            deletion.begin(folder)
         self._forget(manifest)
-        deletion.complete(folder)
+        if there:
+            deletion.complete(folder)
 
     def discard(self, manifest: Manifest) -> None:
         """Deletes a recording that could not be begun, as far as the disk permits."""

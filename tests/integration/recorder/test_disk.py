@@ -546,3 +546,11 @@ async def test_the_room_that_is_told_has_what_older_recordings_make(small_disk: 
         fill(small_disk, 0)
         await running.operations.pin("pin too", one.id, pinned=True)
         await running.until(lambda: running.readings.disk_short)
+
+
+async def test_a_recording_that_was_deleted_by_hand_can_be_deleted(tmp_path: Path) -> None:
+    async with running_recorder(tmp_path) as running:
+        done = await recorded(running)
+        shutil.rmtree(running.readings.folder_of(done))
+        await running.operations.delete("1", done.id, b"", force=False)
+        assert running.readings.recordings == []
