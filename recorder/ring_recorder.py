@@ -3,9 +3,8 @@
 import asyncio
 import logging
 import time
-from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,6 +12,7 @@ from common.errors import InvalidRequestError, PreconditionError, TooMuchError
 from common.reasons import Reason
 from recorder.config import RecorderSettings
 from recorder.incidents import SEVERITIES, Incidents, Rules
+from recorder.outages import Outages
 from recorder.outputs import Outputs
 from recorder.store.catalogue import Catalogue
 from recorder.store.folder import new_id
@@ -20,7 +20,7 @@ from recorder.store.housekeeping import Housekeeping, attempt
 from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason
 from recorder.store.ring import SEGMENT_S, Ring, RingSegment, link_next
 from recorder.store.salvage import ended
-from recorder.values import Gap, GapCause
+from recorder.values import GapCause
 from recorder.writing.output import Closed, Output, Shape
 from recorder.writing.writer import Writer
 
@@ -28,7 +28,6 @@ _log = logging.getLogger(__name__)
 
 MAX_SNAPSHOTS: Final = 16
 _LONGEST_TRIGGER: Final = 1000
-_MAX_OUTAGES: Final = 100
 _NS_PER_S: Final = 1_000_000_000
 _NS_PER_MS: Final = 1_000_000
 
@@ -82,9 +81,7 @@ class RingRecorder:
         self._boot_id = boot_id
         self._run_id = run_id
         self._pending: list[_Snapshot] = []
-        self._outages: deque[Gap] = deque(maxlen=_MAX_OUTAGES)
-        """When nothing was written to the ring; of the last one that lasts, the end is its begin."""
-        self._down = False
+        self._outages = Outages()
         self.problem = ""
         incidents = settings.incidents
         self._incidents = Incidents(
@@ -137,46 +134,20 @@ class RingRecorder:
         """
         for segment in await asyncio.to_thread(self._ring.recover):
             await self._link(segment)
-        if not self._outages and self._ring.newest_ns:
+        if not self._outages.known and self._ring.newest_ns:
             # A former process has left it.
-            self._goes_down(GapCause.INTERRUPTED, self._ring.newest_ns)
+            self._outages.begin(GapCause.INTERRUPTED, self._ring.newest_ns)
         output = Output(self.shape(), self._writer.head, closed)
         await asyncio.wrap_future(self._writer.add(output))
         self._outputs.ring = output
-        self._goes_on()
+        self._outages.end(time.time_ns())
+        self.problem = ""
 
     def fail(self, error: OSError) -> None:
         """Takes note that the disk has failed it; snapshots of this time have a gap."""
         output, self._outputs.ring = self._outputs.ring, None
         self.problem = f"the ring can't be written: {error.strerror}; it is tried again by itself"
-        if not self._down:
-            self._goes_down(GapCause.DISK, output.progress.last_ns if output else time.time_ns())
-
-    def _goes_down(self, cause: GapCause, since_ns: int) -> None:
-        self._down = True
-        self._outages.append(Gap("", cause, since_ns, since_ns, None))
-
-    def _goes_on(self) -> None:
-        self.problem = ""
-        if self._down:
-            self._down = False
-            self._outages.append(self._lasting(self._outages.pop()))
-
-    @staticmethod
-    def _lasting(outage: Gap) -> Gap:
-        return replace(outage, ended_ns=max(outage.began_ns, time.time_ns()))
-
-    def _gaps_within(self, window_ns: tuple[int, int]) -> tuple[Gap, ...]:
-        """Returns what is missing of the ring between two instants of the calendar clock."""
-        from_ns, until_ns = window_ns
-        outages = list(self._outages)
-        if self._down:
-            outages[-1] = self._lasting(outages[-1])
-        return tuple(
-            replace(each, began_ns=max(each.began_ns, from_ns), ended_ns=min(each.ended_ns, until_ns))
-            for each in outages
-            if each.began_ns < until_ns and each.ended_ns > from_ns
-        )
+        self._outages.begin(GapCause.DISK, output.progress.last_ns if output else time.time_ns())
 
     async def close(self) -> None:
         """Makes the last segment final."""
@@ -316,7 +287,7 @@ class RingRecorder:
         numbered = output.progress.numbered if output else manifest.numbered
         update: dict[str, Any] = {"ended_unix_ms": now_ms, "ended_monotonic_ns": now_ns, "numbered": numbered}
         if manifest.window_ns:
-            update["gaps"] = (*manifest.gaps, *self._gaps_within(manifest.window_ns))
+            update["gaps"] = (*manifest.gaps, *self._outages.within(*manifest.window_ns, time.time_ns()))
         firsts = [each.first_ns for each in manifest.segments if each.first_ns is not None]
         if firsts:
             began_ms = min(firsts) // _NS_PER_MS
