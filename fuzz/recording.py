@@ -45,7 +45,7 @@ _ADDED: Final = 64 * 1024
 
 def video_tap(data: bytes) -> None:
     """Records of the video tap, one after the other: what comes of them can be written."""
-    stream, at = Stream(channel(frozenset())), 0
+    stream, at = Stream(channel(frozenset()), NOW), 0
     try:
         while at + HEADER_BYTES <= len(data):
             header = decode_header(data[at : at + HEADER_BYTES])

@@ -2,7 +2,10 @@
 
 import asyncio
 import logging
+import os
 import secrets
+from contextlib import ExitStack
+from pathlib import Path
 
 from common import bind, heartbeat, rpc
 from common.boot import boot_id
@@ -34,7 +37,9 @@ async def serve(settings: RecorderSettings, stop: asyncio.Event) -> None:
     # Before there are other threads: each begins with the priority of the one that starts it.
     step_back()
     queue = SampleQueue(settings.queue_bytes)
-    with folder_lock(settings.root):
+    with ExitStack() as locks:
+        for folder in _own_folders(settings):
+            locks.enter_context(folder_lock(folder))
         async with RobotSources(settings, queue) as sources:
             parts = parts_of(
                 settings,
@@ -62,3 +67,12 @@ async def serve(settings: RecorderSettings, stop: asyncio.Event) -> None:
                 finally:
                     await server.stop(rpc.STOP_GRACE_S)
                     settings.socket.unlink(missing_ok=True)
+
+
+def _own_folders(settings: RecorderSettings) -> list[Path]:
+    """Returns the folders that no other recorder may use.
+
+    A ring of its own that can't be used is left out: it is reported by the recorder, and recordings go on.
+    """
+    root, *ring = dict.fromkeys(each.resolve() for each in settings.folders)
+    return [root, *(each for each in ring if os.access(each if each.exists() else each.parent, os.W_OK))]

@@ -1,7 +1,6 @@
 """Records what was requested: one recording at a time, from its first file to its manifest."""
 
 import asyncio
-import errno
 import logging
 import time
 from collections.abc import Callable
@@ -13,11 +12,11 @@ from recorder.life import Life
 from recorder.lifecycle import Event, State
 from recorder.outputs import Outputs, Sources
 from recorder.requests import Live
-from recorder.store.catalogue import Catalogue
+from recorder.store.catalogue import Catalogue, first_free_number
 from recorder.store.folder import DATA, segment_name
 from recorder.store.housekeeping import attempt
 from recorder.store.manifest import Manifest, RecordingState, StopReason
-from recorder.store.room import Reserve
+from recorder.store.room import Reserve, is_full
 from recorder.store.salvage import ended, whole
 from recorder.store.state_file import StateFile
 from recorder.values import Gap, GapCause
@@ -28,7 +27,6 @@ _log = logging.getLogger(__name__)
 
 _MEASURED_S: Final = 10.0
 """A shorter recording says little about what its preset takes."""
-_FULL: Final = (errno.ENOSPC, errno.EDQUOT)
 _NS_PER_S: Final = 1_000_000_000
 _NS_PER_MS: Final = 1_000_000
 
@@ -88,8 +86,8 @@ class ManualRecorder:
         self.newest_id = manifest.id
         self._life.stopped_by_disk = False
         try:
-            folder = await asyncio.to_thread(self._catalogue.create, manifest)
-            output = Output(self._shape(folder, manifest), self._writer.head, closed)
+            shape = await asyncio.to_thread(self._prepared, manifest)
+            output = Output(shape, self._writer.head, closed)
             await asyncio.wrap_future(self._writer.add(output))
         except OSError as error:
             await self.fail(error)
@@ -137,18 +135,21 @@ class ManualRecorder:
         """Ends the running recording after an error of the disk; keeps what had been written."""
         running, output = self.running, self._outputs.recording
         self._outputs.recording = None
-        full = error.errno in _FULL
+        full = is_full(error)
         what = "the disk is full" if full else f"the disk can't be written: {error.strerror}"
         self._life.stopped_by_disk = full
         self._life.fault(f"{what}; make room or check the disk, it is tried again by itself")
         if running is None:
             return
         now_ns = time.time_ns()
-        failed = _at_end(running, output.progress if output else Progress()).model_copy(
+        progress = output.progress if output else Progress(last_ns=now_ns)
+        # What came after the newest flush was lost with the buffers.
+        lost = Gap("", GapCause.DISK, min(progress.last_ns, now_ns), now_ns, None)
+        failed = _at_end(running, progress).model_copy(
             update={
                 "state": RecordingState.FAULTED,
                 "stop_reason": StopReason.DISK if full else StopReason.ERROR,
-                "gaps": (*running.gaps, Gap("", GapCause.DISK, now_ns, now_ns, None)),
+                "gaps": (*running.gaps, lost),
             }
         )
         await asyncio.to_thread(self._reserve.give)
@@ -214,12 +215,14 @@ class ManualRecorder:
         calendar_ms = manifest.ended_unix_ms - manifest.started_unix_ms
         return max(length_ms or calendar_ms, 0)
 
-    def _shape(self, folder: Path, manifest: Manifest) -> Shape:
+    def _prepared(self, manifest: Manifest) -> Shape:
+        """Makes the folder of a recording, and returns the shape of its next segments; in a thread."""
+        folder = self._catalogue.create(manifest)
         settings = self._settings.segments
         return Shape(
             folder / DATA,
             lambda number: Path(segment_name(number)).name,
-            manifest.next_number,
+            first_free_number(folder),
             manifest.preset,
             manifest.with_video,
             settings.max_bytes,

@@ -3,7 +3,8 @@
 import asyncio
 import logging
 import time
-from typing import Final
+from functools import wraps
+from typing import TYPE_CHECKING, Any, Concatenate, Final, ParamSpec, TypeVar
 
 from common.errors import InvalidRequestError, NotFoundError, PreconditionError
 from common.reasons import Reason
@@ -17,11 +18,39 @@ from recorder.store.housekeeping import attempt
 from recorder.store.manifest import Copy, Kind, Manifest, RecordingState, StopReason
 from recorder.store.state_file import Answer
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Coroutine
+
 _log = logging.getLogger(__name__)
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
 
 _STOP_WAIT_S: Final = 10.0
 _NS_PER_S: Final = 1_000_000_000
 _NS_PER_MS: Final = 1_000_000
+
+
+def _changing(
+    operation: "Callable[Concatenate[Operations, _P], Coroutine[Any, Any, _T]]",
+) -> "Callable[Concatenate[Operations, _P], Coroutine[Any, Any, _T]]":
+    """Has an operation hold the recorder's lock, and go on to its end when its caller has left.
+
+    Callers leave at any time: a deadline passes while a slow disk opens a file. Half an operation would stay.
+    """
+
+    @wraps(operation)
+    async def changing(self: "Operations", /, *args: _P.args, **kwargs: _P.kwargs) -> _T:
+        lock = self._recorder.changing
+        await lock.acquire()
+        work = asyncio.create_task(operation(self, *args, **kwargs))
+        work.add_done_callback(lambda _: lock.release())
+        try:
+            return await asyncio.shield(work)
+        except asyncio.CancelledError:
+            work.add_done_callback(_log_failure)
+            raise
+
+    return changing
 
 
 class Operations:
@@ -42,6 +71,7 @@ class Operations:
         self._readings = readings
         self._recorder = recorder
 
+    @_changing
     async def start(self, request_id: str, options: StartOptions) -> Result:
         """Starts a recording; returns when its first file is open.
 
@@ -50,19 +80,18 @@ class Operations:
             PreconditionError: another one runs, there is no video, or the recorder can't record.
             TooMuchError: the disk has no room.
         """
-        async with self._recorder.changing:
-            if earlier := self._earlier("StartRecording", request_id):
-                return earlier
-            preset = options.preset or self._settings.first_preset
-            with_video = self._with_video(self._known(preset), options.with_video)
-            self._check_can_start()
-            await self._parts.housekeeping.need_room()
-            self._life.move(Event.START)
-            await self._manual.open(self._begun(preset, with_video, options), self._parts.reports.closed)
-            if self._manual.running is None:
-                raise PreconditionError(self._life.error, Reason.RECORDER_NOT_READY)
-            made = self._manual.running
-            return await self._answer("StartRecording", request_id, f"recording {preset}, as {made.id}", made)
+        if earlier := self._earlier("StartRecording", request_id):
+            return earlier
+        preset = options.preset or self._settings.first_preset
+        with_video = self._with_video(self._known(preset), options.with_video)
+        self._check_can_start()
+        await self._parts.housekeeping.need_room()
+        self._life.move(Event.START)
+        await self._manual.open(self._begun(preset, with_video, options), self._parts.reports.closed)
+        if self._manual.running is None:
+            raise PreconditionError(self._life.error, Reason.RECORDER_NOT_READY)
+        made = self._manual.running
+        return await self._answer("StartRecording", request_id, f"recording {preset}, as {made.id}", made)
 
     async def stop(self, request_id: str, recording_id: str) -> Result:
         """Stops a recording; returns when it is final, or after 10 s.
@@ -79,26 +108,27 @@ class Operations:
             running = self._manual.running or self._readings.get(recording_id)
             return Result(f"{running.id} is still being finalised", running)
 
+    @_changing
     async def _stop(self, request_id: str, recording_id: str) -> Result:
-        async with self._recorder.changing:
-            if earlier := self._earlier("StopRecording", request_id):
-                return earlier
-            await self._recorder.take_reports()
-            running = self._manual.running
-            if not recording_id and running is None:
-                raise NotFoundError("no recording runs", Reason.RECORDING_NOT_FOUND)
-            manifest = self._readings.get(recording_id) if recording_id else running
-            assert manifest is not None, "one of both"  # noqa: S101  # for the type checker
-            snapshots = self._ring.due(manifest.id) if self._ring else []
-            message = f"{manifest.id} had ended already"
-            if running and running.id == manifest.id:
-                await self._recorder.end(StopReason.REQUESTED)
-                message = f"{manifest.id} has ended"
-            elif snapshots:
-                await self._recorder.finish_snapshots(snapshots)
-                message = f"{manifest.id} has ended"
-            return await self._answer("StopRecording", request_id, message, self._readings.get(manifest.id))
+        if earlier := self._earlier("StopRecording", request_id):
+            return earlier
+        await self._recorder.take_reports()
+        running = self._manual.running
+        if not recording_id and running is None:
+            raise NotFoundError("no recording runs", Reason.RECORDING_NOT_FOUND)
+        manifest = self._readings.get(recording_id) if recording_id else running
+        assert manifest is not None, "one of both"  # noqa: S101  # for the type checker
+        snapshots = self._ring.due(manifest.id) if self._ring else []
+        message = f"{manifest.id} had ended already"
+        if running and running.id == manifest.id:
+            await self._recorder.end(StopReason.REQUESTED)
+            message = f"{manifest.id} has ended"
+        elif snapshots:
+            await self._recorder.finish_snapshots(snapshots)
+            message = f"{manifest.id} has ended"
+        return await self._answer("StopRecording", request_id, message, self._readings.get(manifest.id))
 
+    @_changing
     async def snapshot(self, request_id: str, options: SnapshotOptions, caller: str) -> Result:
         """Keeps what the ring holds, and records what follows; returns at once.
 
@@ -107,45 +137,43 @@ class Operations:
             PreconditionError: there is no ring, or it can't be written at present.
             TooMuchError: the disk has no room, or 16 are being made.
         """
-        async with self._recorder.changing:
-            if earlier := self._earlier("TriggerSnapshot", request_id):
-                return earlier
-            if options.preset:
-                self._known(options.preset)
-            if self._ring is None:
-                raise PreconditionError(
-                    "the robot keeps no ring; set ring.preset in the recorder's configuration",
-                    Reason.NO_RING,
-                )
-            await self._recorder.take_reports()
-            configured = self._settings.snapshot
-            made = await self._ring.snapshot(
-                Kind.SNAPSHOT,
-                configured.pre_s if options.pre_s is None else options.pre_s,
-                configured.post_s if options.post_s is None else options.post_s,
-                label=options.label,
-                preset=options.preset,
-                trigger=caller,
+        if earlier := self._earlier("TriggerSnapshot", request_id):
+            return earlier
+        if options.preset:
+            self._known(options.preset)
+        if self._ring is None:
+            raise PreconditionError(
+                "the robot keeps no ring; set ring.preset in the recorder's configuration",
+                Reason.NO_RING,
             )
-            return await self._answer(
-                "TriggerSnapshot", request_id, f"snapshot {made.id} is being made", made
-            )
+        await self._recorder.take_reports()
+        configured = self._settings.snapshot
+        made = await self._ring.snapshot(
+            Kind.SNAPSHOT,
+            configured.pre_s if options.pre_s is None else options.pre_s,
+            configured.post_s if options.post_s is None else options.post_s,
+            label=options.label,
+            preset=options.preset,
+            trigger=caller,
+        )
+        return await self._answer("TriggerSnapshot", request_id, f"snapshot {made.id} is being made", made)
 
+    @_changing
     async def pin(self, request_id: str, recording_id: str, *, pinned: bool) -> Result:
         """Pins a recording, or ends that.
 
         Raises:
             NotFoundError: there is no such.
         """
-        async with self._recorder.changing:
-            if earlier := self._earlier("PinRecording", request_id):
-                return earlier
-            await self._recorder.take_reports()
-            manifest = self._readings.get(recording_id).model_copy(update={"pinned": pinned})
-            await self._manual.keep(manifest)
-            message = f"{recording_id} is pinned" if pinned else f"{recording_id} is no longer pinned"
-            return await self._answer("PinRecording", request_id, message, manifest)
+        if earlier := self._earlier("PinRecording", request_id):
+            return earlier
+        await self._recorder.take_reports()
+        manifest = self._readings.get(recording_id).model_copy(update={"pinned": pinned})
+        await self._manual.keep(manifest)
+        message = f"{recording_id} is pinned" if pinned else f"{recording_id} is no longer pinned"
+        return await self._answer("PinRecording", request_id, message, manifest)
 
+    @_changing
     async def delete(
         self, request_id: str, recording_id: str, expected_sha256: bytes, *, force: bool
     ) -> Result:
@@ -155,40 +183,39 @@ class Operations:
             NotFoundError: there is no such.
             PreconditionError: it is running, pinned, not copied yet, or another one than expected.
         """
-        async with self._recorder.changing:
-            if earlier := self._earlier("DeleteRecording", request_id):
-                return earlier
-            await self._recorder.take_reports()
-            manifest = self._readings.get(recording_id)
-            _check_deletable(manifest, expected_sha256, force=force)
-            await asyncio.to_thread(self._parts.catalogue.delete, manifest)
-            _log.info("deleted %s", recording_id)
-            return await self._answer("DeleteRecording", request_id, f"{recording_id} is deleted", None)
+        if earlier := self._earlier("DeleteRecording", request_id):
+            return earlier
+        await self._recorder.take_reports()
+        manifest = self._readings.get(recording_id)
+        _check_deletable(manifest, expected_sha256, force=force)
+        await asyncio.to_thread(self._parts.catalogue.delete, manifest)
+        _log.info("deleted %s", recording_id)
+        return await self._answer("DeleteRecording", request_id, f"{recording_id} is deleted", None)
 
+    @_changing
     async def report_fault(self, fault_id: str, severity: int, message: str) -> str:
         """Makes an incident of a fault, if the rules want one; returns its ID, or ""."""
-        async with self._recorder.changing:
-            if self._ring is None:
-                return ""
-            await self._recorder.take_reports()
-            made = await self._ring.report_fault(fault_id, severity, message)
-            self._parts.reports.wake.set()
-            return made
+        if self._ring is None:
+            return ""
+        await self._recorder.take_reports()
+        made = await self._ring.report_fault(fault_id, severity, message)
+        self._parts.reports.wake.set()
+        return made
 
+    @_changing
     async def set_copy(self, recording_id: str, copy: Copy) -> None:
         """Records the state of the copy elsewhere.
 
         Raises:
             NotFoundError: there is no such recording.
         """
-        async with self._recorder.changing:
-            await self._recorder.take_reports()
-            await self._manual.keep(self._readings.get(recording_id).model_copy(update={"copied": copy}))
+        await self._recorder.take_reports()
+        await self._manual.keep(self._readings.get(recording_id).model_copy(update={"copied": copy}))
 
     # --- parts of operations ---
 
     def _earlier(self, method: str, request_id: str) -> Result | None:
-        answer = self._parts.state_file.answered(method, request_id, time.time())
+        answer = self._parts.state_file.answered(method, request_id, time.monotonic())
         return Result(answer.message, self._parts.catalogue.get(answer.recording_id)) if answer else None
 
     async def _answer(self, method: str, request_id: str, message: str, recording: Manifest | None) -> Result:
@@ -196,7 +223,8 @@ class Operations:
             method=method,
             recording_id=recording.id if recording else "",
             message=message,
-            at_s=time.time(),
+            at_s=time.monotonic(),
+            boot_id=self._parts.boot_id,
         )
         state_file = self._parts.state_file
         state_file.remember(request_id, answer)
@@ -231,6 +259,7 @@ class Operations:
         now_ns = time.time_ns()
         return Manifest(
             id=new_id(now_ns / _NS_PER_S),
+            ordinal=self._parts.catalogue.next_ordinal,
             label=options.label,
             notes=options.notes,
             kind=Kind.MANUAL,
@@ -265,6 +294,6 @@ def _check_deletable(manifest: Manifest, expected_sha256: bytes, *, force: bool)
         )
 
 
-def _log_failure(task: "asyncio.Task[Result]") -> None:
+def _log_failure(task: "asyncio.Task[Any]") -> None:
     if not task.cancelled() and (error := task.exception()):
-        _log.error("a recording could not be stopped: %s", error)
+        _log.error("an operation whose caller has left has failed: %s", error)

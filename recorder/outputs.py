@@ -18,7 +18,7 @@ class Sources(Protocol):
         """Takes the topics of these presets, and the video, from now on; everything else no longer."""
 
     async def caught_up(self) -> None:
-        """Returns when everything that has come by now is in the queue, or after a bounded time."""
+        """Returns when all that has come or was lost by now is in the queue, or after a bounded time."""
 
 
 class Outputs:

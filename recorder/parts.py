@@ -60,7 +60,7 @@ def parts_of(
     """
     life, outputs, reports = Life(), Outputs(sources), Reports()
     catalogue = Catalogue(settings.root)
-    state_file = StateFile(settings.root)
+    state_file = StateFile(settings.root, boot_id)
     reserve = Reserve(settings.root)
     writer = Writer(queue, latched, reports.failed)
     segments = Ring(settings.ring_directory, settings.ring.seconds) if settings.ring.preset else None

@@ -10,7 +10,7 @@ from common.reasons import Reason
 from recorder.lifecycle import Phase
 from recorder.parts import Parts
 from recorder.requests import Live
-from recorder.store.housekeeping import Room
+from recorder.store.housekeeping import LEAST_ROOM, Room
 from recorder.store.manifest import Manifest
 
 NEWEST_ENDED: Final = 16
@@ -54,7 +54,10 @@ class Readings:
     @property
     def last_error(self) -> str:
         """Why it can't record, or not all of what is wanted; empty when all is well."""
-        return self._parts.life.error or self._parts.sources.problem
+        parts = self._parts
+        ring = parts.ring.problem if parts.ring else ""
+        recordings = next(iter(list(parts.catalogue.problems.values())), "")
+        return parts.life.error or ring or parts.sources.problem or recordings
 
     @property
     def running(self) -> Manifest | None:
@@ -84,17 +87,31 @@ class Readings:
 
     @property
     def room_s(self) -> float | None:
-        """How long the room lasts at the present rate; None while no recording is written."""
+        """How long the room lasts at the present rate, that of deletable recordings included.
+
+        None while no recording is written.
+        """
         outputs = self._parts.outputs
         if not (outputs.recording and outputs.bytes_per_s):
             return None
-        return max(self.room.bytes, 0) / outputs.bytes_per_s
+        return self._whole_room_bytes / outputs.bytes_per_s
 
     @property
     def disk_short(self) -> bool:
-        """Whether room is short within an hour, or has ended a recording."""
-        room_s = self.room_s
-        return self._parts.life.stopped_by_disk or (room_s is not None and room_s < _SHORT_S)
+        """Whether there is room for less than an hour, or a recording has ended for want of it."""
+        if self._parts.life.stopped_by_disk:
+            return True
+        if not self.room.disk.size_bytes:
+            return False  # It has not been measured yet.
+        if (room_s := self.room_s) is not None:
+            return room_s < _SHORT_S
+        rate = self.bytes_per_minute.get(self._parts.settings.first_preset, 0) / 60
+        return self._whole_room_bytes < max(LEAST_ROOM, rate * _SHORT_S)
+
+    @property
+    def _whole_room_bytes(self) -> int:
+        housekeeping = self._parts.housekeeping
+        return max(0, housekeeping.room.bytes + housekeeping.deletable_bytes)
 
     @property
     def writes(self) -> bool:

@@ -11,6 +11,7 @@ from recorder.readings import Readings
 from recorder.reports import Failed, Finished
 from recorder.store.housekeeping import LEAST_ROOM
 from recorder.store.manifest import Manifest, RecordingState, StopReason
+from recorder.store.room import is_full
 from recorder.store.salvage import salvage, with_interruption
 
 _log = logging.getLogger(__name__)
@@ -103,7 +104,7 @@ class Recorder:
     async def _begin(self) -> None:
         """Reads the disk, recovers what was cut off, and goes on with what ran; also after a fault."""
         try:
-            goes_on = await asyncio.to_thread(self._load)
+            goes_on = await self._load()
         except OSError as error:
             self._life.fault(f"the folder of recordings can't be read or written: {error.strerror}")
             return
@@ -118,17 +119,43 @@ class Recorder:
             await self._go_on(goes_on)
         await self._open_ring()
 
-    def _load(self) -> Manifest | None:
-        """Reads the disk; in a thread."""
-        parts = self._parts
-        parts.catalogue.load()
-        parts.state_file.load()
-        if parts.segments:
-            parts.segments.load()
-        ring = parts.segments.segments if parts.segments else ()
-        goes_on = salvage(parts.catalogue, ring, parts.boot_id)
-        parts.reserve.take()
+    async def _load(self) -> Manifest | None:
+        """Reads the disk and makes whole what was cut off; where it is full, after room has been made."""
+        await asyncio.to_thread(self._read)
+        try:
+            goes_on = await asyncio.to_thread(self._salvage)
+        except OSError as error:
+            if not is_full(error):
+                raise
+            await self._parts.housekeeping.make_room(LEAST_ROOM)
+            goes_on = await asyncio.to_thread(self._salvage)
+        await asyncio.to_thread(self._take_reserve)
         return goes_on
+
+    def _read(self) -> None:
+        # Making whole needs some room, and the disk may have no other.
+        self._parts.reserve.give()
+        self._parts.catalogue.load()
+        self._parts.state_file.load()
+
+    def _salvage(self) -> Manifest | None:
+        parts = self._parts
+        if parts.segments:
+            try:
+                parts.segments.load()
+            except OSError as error:  # It is opened, and tried again, apart from the recordings.
+                _log.error("what was left of the ring can't be read: %s", error)
+        ring = parts.segments.segments if parts.segments else ()
+        return salvage(parts.catalogue, ring, parts.boot_id)
+
+    def _take_reserve(self) -> None:
+        """Shows whether the disk can be written. A full one can: a recording that begins makes room."""
+        try:
+            self._parts.reserve.take()
+        except OSError as error:
+            if not is_full(error):
+                raise
+            _log.warning("the disk is full: no space is reserved for closing files")
 
     async def _go_on(self, manifest: Manifest) -> None:
         """Continues a recording that a former process of the same boot has left."""
@@ -156,7 +183,7 @@ class Recorder:
             raise RuntimeError("the writer has ended by a defect; see above")
         await self.take_reports()
         if self._life.retry_due:
-            await (self._retry() if self._life.state is State.FAULTED else self._open_ring())
+            await (self._retry() if self._life.state is State.FAULTED else self._retry_ring())
         if self._manual.at_its_limit:
             await self.end(StopReason.LIMIT)
         if self._ring:
@@ -206,14 +233,25 @@ class Recorder:
         await self._open_ring()
 
     async def _keep_room(self) -> None:
+        """Makes room for what is written. The ring alone deletes no recording: it gives way itself."""
         housekeeping = self._parts.housekeeping
         await housekeeping.measure()
         need = max(LEAST_ROOM, int(self._outputs.bytes_per_s * _AHEAD_S))
-        if not self._outputs.all or housekeeping.room.bytes >= need or await housekeeping.make_room(need):
+        if not self._outputs.all or housekeeping.room.bytes >= need:
+            return
+        if await housekeeping.make_room(need, recordings=self._outputs.recording is not None):
             return
         if self._life.state is State.RECORDING:
             await self.end(StopReason.DISK)
             self._life.stopped_for_room()
+        elif self._ring:
+            await self.finish_snapshots(self._ring.due(all_of_them=True), StopReason.DISK)
+
+    async def _retry_ring(self) -> None:
+        """Tries whether the ring can be written again; a full disk may need its own room."""
+        if self._ring and not self._outputs.ring:
+            await self._parts.housekeeping.make_room(LEAST_ROOM, recordings=False)
+            await self._open_ring()
 
     async def _open_ring(self) -> None:
         faulted = self._life.state in (State.FAULTED, State.RECOVERING)
@@ -225,9 +263,10 @@ class Recorder:
             self._ring_failed(error)
 
     def _ring_failed(self, error: OSError) -> None:
-        self._outputs.ring = None
-        what = f"the ring can't be written: {error.strerror}; it is tried again by itself"
-        if self._life.state is State.IDLE:
-            self._life.fault(what)
+        assert self._ring, "it has failed"  # noqa: S101  # for the type checker
+        self._ring.fail(error)
+        # A full disk is no fault: a recording that begins may delete older ones, which the ring may not.
+        if self._life.state is State.IDLE and not is_full(error):
+            self._life.fault(self._ring.problem)
         else:
-            self._life.try_later(what)
+            self._life.try_later(self._ring.problem)

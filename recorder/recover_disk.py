@@ -1,5 +1,6 @@
 """`robot-recorder recover`: makes a disk whole that was taken out of a robot, without any service."""
 
+import os
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -7,11 +8,11 @@ from typing import Any, Final
 
 from common.errors import UserError
 from recorder.mcap.records import PART
-from recorder.mcap.recovery import recover
+from recorder.mcap.recovery import is_untouched, recover
 from recorder.store.catalogue import Catalogue
-from recorder.store.folder import MANIFEST, RECORDINGS
-from recorder.store.lock import folder_lock
-from recorder.store.ring import Ring
+from recorder.store.folder import ID, RECORDINGS
+from recorder.store.lock import folder_lock, has_lock
+from recorder.store.ring import Ring, has_segments
 from recorder.store.salvage import salvage
 
 _RING: Final = "ring"
@@ -26,12 +27,14 @@ class Recovered:
         messages: that it has.
         size: in bytes.
         error: why it could not be made whole; empty if it is.
+        damaged: whether its damage leaves no message; then it is kept.
     """
 
     file: str
     messages: int = 0
     size: int = 0
     error: str = ""
+    damaged: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         """Returns it as a JSON object."""
@@ -42,41 +45,53 @@ def sentence(each: Recovered) -> str:
     """Returns a line for people."""
     if each.error:
         return f"{each.file}: {each.error}"
+    if each.damaged:
+        return f"{each.file}: its damage leaves no message; it is kept"
     if not each.messages:
         return f"{each.file}: nothing was in it"
     return f"{each.file}: {each.messages} messages, {each.size} bytes"
 
 
-def recover_below(directory: Path) -> list[Recovered]:
+def recover_below(named: Path) -> list[Recovered]:
     """Makes every unfinished file whole, and completes the recordings that they belong to.
 
     Args:
-        directory: a folder of recordings, the folder of one, or one unfinished file.
+        named: a folder that is, or is in, or contains, a folder of recordings; or one unfinished file, which
+            is then all that is changed.
 
     Raises:
         UserError: there is no such, or a recorder uses it.
     """
-    if directory.is_file():
-        return [_recovered(directory)]
-    if not directory.is_dir():
-        raise UserError(f"{directory} does not exist", "Name the folder of recordings, or one of them")
+    path = named.resolve()
+    if path.is_file() and not path.name.endswith(PART):
+        raise UserError(f"{named} is not unfinished", f"Name a folder, or a file *.mcap{PART}")
+    if not path.exists():
+        raise UserError(f"{named} does not exist", "Name the folder of recordings, or one of them")
+    roots = _roots_of(path)
     with ExitStack() as stack:
-        root = _root_of(directory)
-        if root:
+        for root in roots:
             stack.enter_context(folder_lock(root))
-        found = [_recovered(part) for part in sorted(directory.rglob(f"*.mcap{PART}"))]
-        if root and not any(each.error for each in found):
-            _complete(root)
+        if path.is_file():
+            return [_recovered(path)]
+        found = [_recovered(part) for part in sorted(path.rglob(f"*.mcap{PART}"))]
+        for root in roots:
+            if (root / RECORDINGS).is_dir():
+                _complete(root)
     return found
 
 
-def _root_of(directory: Path) -> Path | None:
-    """Returns the folder of recordings that a directory is, or is in; None if there is none."""
-    if (directory / RECORDINGS).is_dir():
-        return directory
-    if (directory / MANIFEST).is_file() and directory.parent.name == RECORDINGS:
-        return directory.parent.parent
-    return None
+def _roots_of(path: Path) -> list[Path]:
+    """Returns the folders that a recorder may use at present: above a path, and below it."""
+    below = (Path(folder) for folder, _, _ in os.walk(path))
+    return [each for each in (*reversed(path.parents), *below) if _is_root(each)]
+
+
+def _is_root(folder: Path) -> bool:
+    """Returns whether a recorder keeps its recordings, or a ring of its own, in a folder."""
+    recordings = folder / RECORDINGS
+    if has_lock(folder):
+        return recordings.is_dir() or has_segments(folder)
+    return recordings.is_dir() and any(ID.fullmatch(each.name) for each in recordings.iterdir())
 
 
 def _complete(root: Path) -> None:
@@ -96,8 +111,8 @@ def _complete(root: Path) -> None:
 def _recovered(part: Path) -> Recovered:
     try:
         summary = recover(part)
+        if summary is None:
+            return Recovered(str(part), damaged=not is_untouched(part))
     except OSError as error:
         return Recovered(str(part), error=error.strerror or str(error))
-    if summary is None:
-        return Recovered(str(part))
     return Recovered(str(summary.path), summary.messages, summary.size)

@@ -12,6 +12,7 @@ from common.errors import InvalidRequestError, PreconditionError, TooMuchError
 from common.reasons import Reason
 from recorder.config import RecorderSettings
 from recorder.incidents import SEVERITIES, Incidents, Rules
+from recorder.outages import Outages
 from recorder.outputs import Outputs
 from recorder.store.catalogue import Catalogue
 from recorder.store.folder import new_id
@@ -19,6 +20,7 @@ from recorder.store.housekeeping import Housekeeping, attempt
 from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason
 from recorder.store.ring import SEGMENT_S, Ring, RingSegment, link_next
 from recorder.store.salvage import ended
+from recorder.values import GapCause
 from recorder.writing.output import Closed, Output, Shape
 from recorder.writing.writer import Writer
 
@@ -52,6 +54,9 @@ class RingRecorder:
         housekeeping: makes room for snapshots.
         boot_id: of the computer; empty if unknown.
         run_id: of this process.
+
+    Attributes:
+        problem: why it can't be written, for people; empty if it can.
     """
 
     def __init__(
@@ -76,6 +81,8 @@ class RingRecorder:
         self._boot_id = boot_id
         self._run_id = run_id
         self._pending: list[_Snapshot] = []
+        self._outages = Outages()
+        self.problem = ""
         incidents = settings.incidents
         self._incidents = Incidents(
             Rules(
@@ -127,9 +134,20 @@ class RingRecorder:
         """
         for segment in await asyncio.to_thread(self._ring.recover):
             await self._link(segment)
+        if not self._outages.known and self._ring.newest_ns:
+            # A former process has left it.
+            self._outages.begin(GapCause.INTERRUPTED, self._ring.newest_ns)
         output = Output(self.shape(), self._writer.head, closed)
         await asyncio.wrap_future(self._writer.add(output))
         self._outputs.ring = output
+        self._outages.end(time.time_ns())
+        self.problem = ""
+
+    def fail(self, error: OSError) -> None:
+        """Takes note that the disk has failed it; snapshots of this time have a gap."""
+        output, self._outputs.ring = self._outputs.ring, None
+        self.problem = f"the ring can't be written: {error.strerror}; it is tried again by itself"
+        self._outages.begin(GapCause.DISK, output.progress.last_ns if output else time.time_ns())
 
     async def close(self) -> None:
         """Makes the last segment final."""
@@ -185,6 +203,7 @@ class RingRecorder:
         pre_ns, post_ns = pre_s * _NS_PER_S, post_s * _NS_PER_S
         manifest = Manifest(
             id=new_id(calendar_ns / _NS_PER_S),
+            ordinal=self._catalogue.next_ordinal,
             label=label,
             kind=kind,
             state=RecordingState.RECORDING,
@@ -221,7 +240,7 @@ class RingRecorder:
         if pending:
             made = pending[-1].id
             pending[-1].until_ns = time.monotonic_ns() + configured.post_s * _NS_PER_S
-            await self._add_trigger(made, fault_id)
+            await self._merge(made, fault_id)
         else:
             trigger = f"{fault_id}: {message}" if message else fault_id
             try:
@@ -251,13 +270,13 @@ class RingRecorder:
 
     def _begun(self, manifest: Manifest, segments: list[RingSegment]) -> Manifest:
         """Makes a snapshot's folder, with what the ring has of it already; in a thread."""
-        folder = self._catalogue.create(manifest)
         try:
+            folder = self._catalogue.create(manifest)
             for segment in segments:
                 manifest = link_next(folder, manifest, segment)
             self._catalogue.write(manifest)
         except OSError:
-            self._catalogue.delete(manifest)
+            self._catalogue.discard(manifest)
             raise
         return manifest
 
@@ -267,6 +286,8 @@ class RingRecorder:
         output = self._outputs.ring
         numbered = output.progress.numbered if output else manifest.numbered
         update: dict[str, Any] = {"ended_unix_ms": now_ms, "ended_monotonic_ns": now_ns, "numbered": numbered}
+        if manifest.window_ns:
+            update["gaps"] = (*manifest.gaps, *self._outages.within(*manifest.window_ns, time.time_ns()))
         firsts = [each.first_ns for each in manifest.segments if each.first_ns is not None]
         if firsts:
             began_ms = min(firsts) // _NS_PER_MS
@@ -274,10 +295,14 @@ class RingRecorder:
             update["started_monotonic_ns"] = max(now_ns - max(now_ms - began_ms, 0) * _NS_PER_MS, 0)
         return manifest.model_copy(update=update)
 
-    async def _add_trigger(self, recording_id: str, fault_id: str) -> None:
-        if before := self._catalogue.get(recording_id):
+    async def _merge(self, recording_id: str, fault_id: str) -> None:
+        """Notes in an incident's manifest one more fault, and that it lasts longer for it."""
+        before = self._catalogue.get(recording_id)
+        if before and before.window_ns:
             trigger = f"{before.trigger}; {fault_id}"[:_LONGEST_TRIGGER]
-            await self._keep(before.model_copy(update={"trigger": trigger}))
+            until_ns = time.time_ns() + self._settings.incidents.post_s * _NS_PER_S
+            update = {"trigger": trigger, "window_ns": (before.window_ns[0], until_ns)}
+            await self._keep(before.model_copy(update=update))
 
     async def _link(self, segment: RingSegment) -> None:
         """Adds a segment to the snapshots that it belongs to."""

@@ -77,9 +77,14 @@ class RobotSources:
             self._end_tap()
 
     async def caught_up(self) -> None:
-        """Returns when everything that has come by now is in the queue, or after half a second."""
+        """Returns when all that has come or was lost by now is in the queue, or after half a second."""
+        if self._tap:
+            self._tap.catch_up()
+        if self._intake is None:
+            return
         asked_s = time.monotonic()
-        while self._intake and (self._intake.ros_passed_s or 0.0) < asked_s:
+        ticket = self._intake.catch_up()
+        while self._intake.caught_up < ticket:
             if time.monotonic() - asked_s > _CATCH_UP_S:
                 _log.warning("ROS 2 has not been read for %g s", _CATCH_UP_S)
                 return

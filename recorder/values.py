@@ -87,7 +87,14 @@ class Note:
     values: Mapping[str, str]
 
 
-Item = Sample | Loss | Note
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """A topic is no longer taken: what its publishers had kept for late subscribers is no longer of now."""
+
+    channel: Channel
+
+
+Item = Sample | Loss | Note | Ended
 """What waits to be written."""
 
 

@@ -27,7 +27,7 @@ from recorder.intake.qos import is_latched, offered_qos
 from recorder.intake.schemas import ENCODING, Schemas
 from recorder.intake.source import Source
 from recorder.intake.topics import Selects, selected
-from recorder.values import Channel, Item
+from recorder.values import Channel, Ended, Item
 
 _log = logging.getLogger(__name__)
 
@@ -75,6 +75,7 @@ class Intake:
 
     Attributes:
         ros_passed_s: monotonic time of the end of the newest pass.
+        caught_up: the newest ticket of `catch_up` that has been served.
         topics: those that are subscribed.
         problems: by topic, for people: what keeps it from being recorded. Of the graph as a whole: "".
     """
@@ -89,6 +90,8 @@ class Intake:
         self._schemas = Schemas()
         self._found: dict[str, str] = {}
         """Problems since the graph was last examined."""
+        self._ticket = 0
+        self.caught_up = 0
         self.ros_passed_s: float | None = time.monotonic()
         self.topics: tuple[str, ...] = ()
         self.problems: Mapping[str, str] = {}
@@ -97,16 +100,27 @@ class Intake:
         """Takes the topics of these presets from the next pass on, and no others. From any thread."""
         self._wanted = presets
 
+    def catch_up(self) -> int:
+        """Has the next pass tell all losses so far; returns a ticket, which `caught_up` reaches then.
+
+        By then everything that had come before is in the queue, too. For one other thread.
+        """
+        self._ticket += 1
+        return self._ticket
+
     def take(self) -> None:
         """Makes one pass: empties all subscriptions, and examines the graph when it is due."""
+        ticket = self._ticket
         now = present_instant()
         wanted = self._wanted
         for entry in self._entries.values():
             self._empty(entry, now)
-        if wanted != self._examined or now.monotonic_s >= self._examine_at_s:
+        due = now.monotonic_s >= self._examine_at_s or ticket != self.caught_up
+        if wanted != self._examined or due:
             self._examine_at_s, self._examined = now.monotonic_s + EXAMINE_EVERY_S, wanted
             self._examine(wanted, now)
             self._report()
+        self.caught_up = ticket
 
     def _empty(self, entry: _Entry, now: Instant) -> None:
         topic = entry.source.channel.topic
@@ -214,7 +228,10 @@ class Intake:
 
     def _close(self, keys: Sequence[_Key]) -> None:
         for key in keys:
-            self._entries.pop(key).source.close()
+            source = self._entries.pop(key).source
+            source.close()
+            if source.channel.latched:
+                self._put([Ended(source.channel)])
         if keys:
             # Channels of topics that come back stay the same, but names are not collected for ever.
             for key in list(self._channels)[: max(0, len(self._channels) - _MAX_KNOWN)]:

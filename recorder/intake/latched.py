@@ -10,6 +10,8 @@ from typing import Final
 
 from recorder.values import Channel, Sample
 
+_LOG: Final = "/rosout"
+"""Its publishers keep their newest 1000 lines: a history, and not what holds now."""
 MAX_MESSAGES: Final = 64
 """Of a channel; then the oldest goes."""
 MAX_BYTES: Final = 64 * 1024 * 1024
@@ -25,6 +27,8 @@ class LatchedCache:
 
     def take(self, sample: Sample) -> None:
         """Takes a message of a latched channel."""
+        if sample.channel.topic == _LOG:
+            return
         kept = self._channels.setdefault(sample.channel, [])
         replaced = _replaced_by(sample, kept)
         if replaced is not None:
@@ -37,6 +41,11 @@ class LatchedCache:
             many := [each for each in self._channels.values() if len(each) > 1]
         ):
             self._remove(max(many, key=lambda each: sum(len(one.data) for one in each)), 0)
+
+    def forget(self, channel: Channel) -> None:
+        """Forgets the messages of a channel whose publishers are gone, or which is no longer taken."""
+        for each in self._channels.pop(channel, []):
+            self._bytes -= len(each.data)
 
     def samples(self) -> Sequence[Sample]:
         """Returns what is kept; of each channel in the order of reception."""

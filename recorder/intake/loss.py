@@ -2,16 +2,19 @@
 
 DDS numbers the messages of each publisher (DDSI-RTPS 8.3.5.4). rclpy hands the number over, but not the
 publisher. Of one publisher the count is exact. Of several, each number is taken for the next of the sequence
-that it fits best: exact while their numbers are apart, close otherwise, and 0 where nothing was lost. Where
-publishers come or go, numbers prove nothing for a moment: what seems to be missing then is not counted.
+that it fits best: exact while their numbers are apart, close otherwise, and 0 where nothing was lost. When
+publishers have come or gone, the numbers since they were looked at last are gone through once more, as of all
+that there were meanwhile. How many are missing is unknown while nothing is known of the publishers.
 """
 
 from collections.abc import Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 _MAX_SEQUENCES: Final = 256
 _MAX_RANGES: Final = 1024
+_MAX_RECENT: Final = 100_000
+"""Numbers that are kept to go through them again: those of a second, at up to 100 kHz."""
 
 
 @dataclass(slots=True)
@@ -36,7 +39,8 @@ class _Missing:
 class Lost:
     """Messages that are missing, and the log times of the messages around them."""
 
-    messages: int
+    messages: int | None
+    """None where it is unknown how many."""
     began_ns: int
     ended_ns: int
 
@@ -51,12 +55,22 @@ class LossCounter:
     def __init__(self) -> None:
         self._sequences: list[_Sequence] = []
         self._missing: list[_Missing] = []
-        self._publishers: frozenset[Hashable] | None = frozenset()
+        self._publishers: frozenset[Hashable] = frozenset()
+        self._expected = 1
+        """How many publishers there are, as far as is known."""
+        self._before: list[_Sequence] = []
+        """The sequences as they were at the last `collect`, and in `_recent` what has come since."""
+        self._recent: list[tuple[int, int]] = []
 
     def take(self, number: int, at_ns: int) -> None:
         """Notes a message; numbers below 1 mean that the middleware does not number messages."""
         if number < 1:
             return
+        if len(self._recent) <= _MAX_RECENT:
+            self._recent.append((number, at_ns))
+        self._take(number, at_ns)
+
+    def _take(self, number: int, at_ns: int) -> None:
         below: _Sequence | None = None
         for each in self._sequences:
             if each.last == number - 1:
@@ -83,23 +97,35 @@ class LossCounter:
         Args:
             publishers: identities of those that the graph has now; None if it can't be examined.
         """
+        exact = publishers is not None
+        if publishers is not None and publishers != self._publishers:
+            exact = len(self._recent) <= _MAX_RECENT
+            if exact:
+                self._go_through_again(publishers | self._publishers)
+            self._expect(publishers)
         missing, self._missing = self._missing, []
-        changed = publishers is None or publishers != self._publishers
-        self._publishers = publishers
-        if changed:
-            self._forget_oldest(len(publishers or ()) or 1)
-            return None
+        self._before = [replace(each) for each in self._sequences]
+        self._recent.clear()
         if not missing:
             return None
         return Lost(
-            messages=sum(each.last - each.first + 1 for each in missing),
+            messages=sum(each.last - each.first + 1 for each in missing) if exact else None,
             began_ns=min(each.began_ns for each in missing),
             ended_ns=max(each.ended_ns for each in missing),
         )
 
-    @property
-    def _expected(self) -> int:
-        return min(max(len(self._publishers or ()), 1), _MAX_SEQUENCES)
+    def _go_through_again(self, publishers: frozenset[Hashable]) -> None:
+        """Takes what has come since the last `collect` for messages of these publishers."""
+        self._sequences, self._missing = self._before, []
+        self._expected = _bounded(len(publishers))
+        for number, at_ns in self._recent:
+            self._take(number, at_ns)
+
+    def _expect(self, publishers: frozenset[Hashable]) -> None:
+        """Knows the publishers from now on; forgets the oldest sequences of those that have gone."""
+        self._publishers, self._expected = publishers, _bounded(len(publishers))
+        self._sequences.sort(key=lambda each: each.at_ns)
+        del self._sequences[: max(0, len(self._sequences) - self._expected)]
 
     def _found(self, number: int) -> bool:
         """Removes a number from the missing ones; returns whether it was one."""
@@ -113,10 +139,6 @@ class LossCounter:
                 return True
         return False
 
-    def _forget_oldest(self, kept: int) -> None:
-        self._sequences.sort(key=lambda each: each.at_ns)
-        del self._sequences[: max(0, len(self._sequences) - kept)]
-
     def _bound(self) -> None:
         """Joins the oldest two ranges where there are too many; late messages of them stay counted."""
         if len(self._missing) > _MAX_RANGES:
@@ -124,3 +146,7 @@ class LossCounter:
             count = (first.last - first.first + 1) + (second.last - second.first + 1)
             # Numbers that no message has: below 1.
             self._missing[:2] = [_Missing(1 - count, 0, first.began_ns, second.ended_ns)]
+
+
+def _bounded(publishers: int) -> int:
+    return min(max(publishers, 1), _MAX_SEQUENCES)

@@ -1,16 +1,24 @@
 """Reading final segments: what one contains, and its messages of one topic."""
 
 import hashlib
+import struct
 from collections.abc import Iterator
 from io import BufferedReader
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
+import zstandard
 from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
 
 from recorder.mcap.records import GAP, OFFERED_QOS, gap_of_note
 from recorder.values import ChannelSummary, Note, SegmentSummary
+
+_DAMAGES: Final = (
+    *(McapError, struct.error, zstandard.ZstdError),
+    *(ValueError, KeyError, IndexError, OverflowError, MemoryError),
+)
+"""The library checks lengths, but not everything that a damaged file can have in place of them."""
 
 
 def summarise(path: Path) -> SegmentSummary | None:
@@ -22,8 +30,7 @@ def summarise(path: Path) -> SegmentSummary | None:
     with path.open("rb") as file:
         try:
             return _summary(path, file)
-        # The library checks lengths, but not everything that a damaged file can have in place of them.
-        except (McapError, ValueError, KeyError, IndexError, OverflowError, MemoryError):
+        except _DAMAGES:
             return None
 
 
@@ -37,7 +44,7 @@ def messages(path: Path, topic: str) -> Iterator[tuple[int, bytes]]:
         try:
             for _, _, message in _reader(file).iter_messages(topics=[topic]):
                 yield message.log_time, message.data
-        except (McapError, ValueError, KeyError, IndexError, OverflowError, MemoryError):
+        except _DAMAGES:
             return
 
 

@@ -66,6 +66,17 @@ def recover(part: Path) -> SegmentSummary | None:
     )
 
 
+def is_untouched(part: Path) -> bool:
+    """Returns whether an unfinished segment without a message is undamaged: none was written to it.
+
+    Raises:
+        OSError: the disk fails.
+    """
+    size = part.stat().st_size
+    with part.open("rb") as file:
+        return scan(file, size).end == size
+
+
 def _unknown_channels(found: Contents) -> bytes:
     """Makes up the channels whose definitions are lost; returns their records."""
     unknown = {

@@ -1,6 +1,7 @@
 """The metadata.yaml of rosbag2: with it beside them, `ros2 bag play` and others open a folder of segments."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, Final
 
 import yaml
@@ -14,10 +15,12 @@ _VERSION: Final = 9
 _DISTRIBUTION: Final = "jazzy"
 
 
-def metadata(segments: Sequence[SegmentSummary]) -> str:
+def metadata(segments: Sequence[SegmentSummary], about: Mapping[str, str] = MappingProxyType({})) -> str:
     """Returns the content of the metadata.yaml that lies in the folder of these segments.
 
-    Segments without messages are left out: some readers don't open them.
+    Args:
+        segments: those without messages are left out: some readers don't open them.
+        about: what else is known of the recording: rosbag2's "custom_data".
     """
     filled = [each for each in segments if each.first_ns is not None and each.last_ns is not None]
     information = {
@@ -30,7 +33,7 @@ def metadata(segments: Sequence[SegmentSummary]) -> str:
         "compression_mode": "",
         "relative_file_paths": [each.path.name for each in filled],
         "files": [{"path": each.path.name, **_span([each])} for each in filled],
-        "custom_data": {},
+        "custom_data": dict(about),
         "ros_distro": _DISTRIBUTION,
     }
     return yaml.safe_dump(

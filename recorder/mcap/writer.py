@@ -24,6 +24,8 @@ MAX_CHUNK: Final = 1024 * 1024
 _MODE: Final = 0o640
 _UINT32: Final = 0xFFFF_FFFF
 """Sequence numbers of MCAP have 32 bits, those of DDS 64."""
+_MAX_TIME_NS: Final = 0xFFFF_FFFF_FFFF_FFFF
+"""Times of MCAP have 64 bits and no sign."""
 
 
 class SegmentWriter:
@@ -52,9 +54,15 @@ class SegmentWriter:
         self._last_ns: int | None = None
         self._messages = 0
         self._gaps: list[Gap] = []
-        self._mcap.start(profile=PROFILE, library=f"robot-gateway {project_version()}")
-        for each in head:
-            self.note(each)
+        try:
+            self._mcap.start(profile=PROFILE, library=f"robot-gateway {project_version()}")
+            for each in head:
+                self.note(each)
+        except OSError:
+            # Nobody gets the object that would be abandoned, and nothing is in the file.
+            self.abandon()
+            path.unlink(missing_ok=True)
+            raise
 
     @property
     def size(self) -> int:
@@ -65,12 +73,17 @@ class SegmentWriter:
         """Adds a message; a full chunk goes to the file."""
         if self._pending and self._pending + len(sample.data) > MAX_CHUNK:
             self._end_chunk()
-        channel, at_ns = sample.channel, sample.log_time_ns
+        channel, at_ns = sample.channel, min(max(sample.log_time_ns, 0), _MAX_TIME_NS)
+        published_ns = sample.publish_time_ns
+        if not 0 <= published_ns <= _MAX_TIME_NS:
+            # Fast DDS says -1 where the publisher sends no time, and a peer may send any. MCAP, "Message":
+            # without a publish time it is the log time.
+            published_ns = at_ns
         self._mcap.add_message(
             self._channels.get(channel) or self._register(channel),
             at_ns,
             sample.data,
-            sample.publish_time_ns,
+            published_ns,
             sample.sequence & _UINT32,
         )
         self._pending += len(sample.data)

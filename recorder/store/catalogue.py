@@ -1,17 +1,19 @@
 """All recordings on the disk, by ID: read at the start, then changed with the disk."""
 
 import logging
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
 from recorder.mcap.reading import summarise
 from recorder.mcap.records import PART
+from recorder.store import deletion
 from recorder.store.folder import (
+    DAMAGED_MANIFEST,
     DATA,
     ID,
     MANIFEST,
-    METADATA,
     RECORDINGS,
     SEGMENT_FILE,
     files_named,
@@ -25,10 +27,11 @@ from recorder.store.manifest import (
     StopReason,
     read_manifest,
 )
+from recorder.values import SegmentSummary
 
 _log = logging.getLogger(__name__)
 
-_DAMAGED: Final = f"{MANIFEST}.damaged"
+_NUMBERED: Final = re.compile(r"(\d{6})\.mcap")
 
 
 class Catalogue:
@@ -39,10 +42,12 @@ class Catalogue:
 
     Attributes:
         revision: grows with every change.
+        problems: by recording, for people: what keeps it from being completed.
     """
 
     def __init__(self, root: Path) -> None:
         self.revision = 0
+        self.problems: dict[str, str] = {}
         self._folder = root / RECORDINGS
         self._manifests: dict[str, Manifest] = {}
 
@@ -55,6 +60,11 @@ class Catalogue:
         """Returns a recording; None if there is no such."""
         return self._manifests.get(recording_id)
 
+    @property
+    def next_ordinal(self) -> int:
+        """The ordinal of the next recording."""
+        return max((each.ordinal + 1 for each in self._manifests.values()), default=1)
+
     def folder_of(self, manifest: Manifest) -> Path:
         """Returns the folder of a recording."""
         return self._folder / manifest.id
@@ -62,24 +72,32 @@ class Catalogue:
     def load(self) -> None:
         """Reads all manifests; makes those anew that can't be read, and ends deletions that were cut off.
 
-        What does not look like a recording is left alone.
+        What does not look like a recording is left alone. One that the disk refuses costs no other one.
 
         Raises:
             OSError: the folder can't be read or written.
         """
         make_directory(self._folder)
+        self.problems.clear()
         for folder in sorted(self._folder.iterdir()):
             if not ID.fullmatch(folder.name) or folder.is_symlink() or not folder.is_dir():
                 continue
             try:
-                manifest: Manifest | None = read_manifest(folder)
-            except DamagedManifestError as error:
-                manifest = _rebuilt(folder, str(error))
-            if manifest is None:
-                continue
-            self._manifests[manifest.id] = manifest
-            if manifest.deleting:
-                self.delete(manifest)
+                self._read(folder)
+            except OSError as error:
+                self.set_aside(_unreadable(folder), error)
+
+    def set_aside(self, manifest: Manifest, error: OSError) -> None:
+        """Lists a recording that the disk refuses as one that has failed, so that all others go on.
+
+        What the disk has of it stays as it is; the next start tries again.
+        """
+        problem = f"recording {manifest.id} can't be completed: {error.strerror}"
+        _log.error("%s (%s)", problem, error)
+        self.problems[manifest.id] = f"{problem}; copy what it has and delete it, or check the disk"
+        failed = {"state": RecordingState.FAULTED, "stop_reason": StopReason.ERROR}
+        self._manifests[manifest.id] = manifest.model_copy(update=failed)
+        self.revision += 1
 
     def create(self, manifest: Manifest) -> Path:
         """Makes a recording's folder and returns it.
@@ -105,21 +123,45 @@ class Catalogue:
     def delete(self, manifest: Manifest) -> None:
         """Deletes a recording's files, and its folder unless something unknown is in it.
 
+        It needs no room: a full disk is what it is for.
+
         Raises:
             OSError: the disk fails; the next start goes on.
         """
         folder = self.folder_of(manifest)
-        manifest.model_copy(update={"deleting": True}).write(folder)
+        there = folder.is_dir()  # Somebody may have deleted it by hand.
+        if there:
+            deletion.begin(folder)
+        self._forget(manifest)
+        if there:
+            deletion.complete(folder)
+
+    def discard(self, manifest: Manifest) -> None:
+        """Deletes a recording that could not be begun, as far as the disk permits."""
+        try:
+            self.delete(manifest)
+        except OSError as error:
+            self._forget(manifest)
+            _log.warning("what there is of %s is not deleted: %s", manifest.id, error)
+
+    def _read(self, folder: Path) -> None:
+        if deletion.has_begun(folder):
+            deletion.complete(folder)
+            return
+        try:
+            manifest: Manifest | None = read_manifest(folder)
+        except DamagedManifestError as error:
+            manifest = _rebuilt(folder, str(error))
+        if manifest is None:
+            return
+        self._manifests[manifest.id] = manifest
+        if manifest.deleting:
+            self.delete(manifest)
+
+    def _forget(self, manifest: Manifest) -> None:
         self._manifests.pop(manifest.id, None)
+        self.problems.pop(manifest.id, None)
         self.revision += 1
-        parts = segments_in(folder, PART)
-        for path in (*(folder / file.name for file in manifest.files), *parts, folder / METADATA):
-            path.unlink(missing_ok=True)
-        for name in (_DAMAGED, MANIFEST):
-            (folder / name).unlink(missing_ok=True)
-        for directory in (folder / DATA, folder):
-            if not any(directory.iterdir()):
-                directory.rmdir()
 
 
 def segments_in(folder: Path, suffix: str = "") -> list[Path]:
@@ -130,6 +172,21 @@ def segments_in(folder: Path, suffix: str = "") -> list[Path]:
     return files_named(data, SEGMENT_FILE, suffix)
 
 
+def first_free_number(folder: Path) -> int:
+    """Returns the number of a recording's next segment, by the files that are there, damaged ones included.
+
+    Raises:
+        OSError: the disk fails.
+    """
+    names = [path.name for path in (folder / DATA).iterdir()] if (folder / DATA).is_dir() else []
+    return max((int(found[1]) + 1 for name in names if (found := _NUMBERED.match(name))), default=0)
+
+
+def _unreadable(folder: Path) -> Manifest:
+    """Returns what stands for a recording of which nothing is known but that it is there."""
+    return Manifest(id=folder.name, kind=Kind.MANUAL, state=RecordingState.FAULTED, pinned=True)
+
+
 def _rebuilt(folder: Path, why: str) -> Manifest | None:
     """Returns a manifest made from the segments; None if there are none. The damaged one is kept aside."""
     finals = segments_in(folder)
@@ -137,7 +194,7 @@ def _rebuilt(folder: Path, why: str) -> Manifest | None:
         return None
     _log.warning("the manifest of recording %s is made anew from its segments: %s", folder.name, why)
     if (folder / MANIFEST).exists():
-        (folder / MANIFEST).replace(folder / _DAMAGED)
+        (folder / MANIFEST).replace(folder / DAMAGED_MANIFEST)
     manifest = Manifest(
         id=folder.name,
         kind=Kind.MANUAL,
@@ -147,11 +204,23 @@ def _rebuilt(folder: Path, why: str) -> Manifest | None:
         pinned=True,
     )
     for path in finals:
-        summary = summarise(path)
-        if summary is None:
-            _log.warning("%s can't be read and is left alone", path)
-            continue
-        manifest = manifest.with_segment(f"{DATA}/{path.name}", summary)
+        if summary := readable(path):
+            manifest = manifest.with_segment(f"{DATA}/{path.name}", summary)
     manifest = manifest.spanning()
-    manifest.write(folder)
+    try:
+        manifest.write(folder)
+    except OSError as error:
+        _log.error("the manifest of %s is not on the disk: %s", manifest.id, error)
     return manifest
+
+
+def readable(path: Path) -> SegmentSummary | None:
+    """Returns what a final segment contains; None, with a line in the log, if it can't be read."""
+    try:
+        summary = summarise(path)
+    except OSError as error:
+        _log.error("%s can't be read and is left alone: %s", path, error.strerror)
+        return None
+    if summary is None:
+        _log.warning("%s is damaged and is left alone", path)
+    return summary

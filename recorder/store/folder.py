@@ -9,10 +9,12 @@ import re
 import secrets
 import tempfile
 from datetime import UTC, datetime
+from itertools import count
 from pathlib import Path
 from typing import Final
 
 from common import private_files
+from recorder.mcap.records import PART
 
 ID: Final = re.compile(r"\d{8}T\d{6}Z-[0-9a-f]{6}")
 """Of recordings that the recorder makes: the start by the calendar clock in UTC, and a random part."""
@@ -22,6 +24,9 @@ SEGMENT_FILE: Final = re.compile(r"\d{6}\.mcap")
 SEGMENT: Final = re.compile(f"{DATA}/{SEGMENT_FILE.pattern}")
 """A segment's name in a recording's folder."""
 MANIFEST: Final = "manifest.json"
+DAMAGED: Final = ".damaged"
+"""Suffix of a file that can't be used and is kept aside; of several of one name, a number follows."""
+DAMAGED_MANIFEST: Final = f"{MANIFEST}{DAMAGED}"
 METADATA: Final = f"{DATA}/metadata.yaml"
 """rosbag2's file, beside the segments: some readers look for them nowhere else."""
 
@@ -58,6 +63,21 @@ def files_named(directory: Path, name: re.Pattern[str], suffix: str = "") -> lis
         and path.is_file()
         and not path.is_symlink()
     )
+
+
+def put_aside(path: Path) -> Path:
+    """Renames "NAME" or "NAME.part" to "NAME.damaged", or the like if that exists, and returns the new path.
+
+    Raises:
+        OSError: the disk fails.
+    """
+    aside = wanted = path.with_name(path.name.removesuffix(PART) + DAMAGED)
+    numbers = count(1)
+    while aside.exists():
+        aside = wanted.with_name(f"{wanted.name}.{next(numbers)}")
+    path.rename(aside)
+    private_files.sync_directory(path.parent)
+    return aside
 
 
 def make_directory(directory: Path) -> None:

@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final, TypeVar
@@ -10,10 +11,10 @@ from common.errors import TooMuchError
 from common.reasons import Reason
 from recorder.config import RecorderSettings
 from recorder.store.catalogue import Catalogue
-from recorder.store.manifest import CopyState
-from recorder.store.retention import Keepable, in_order
+from recorder.store.manifest import CopyState, Manifest
+from recorder.store.retention import Keepable, frees, in_order
 from recorder.store.ring import Ring
-from recorder.store.room import Disk, Limits, disk_of, used_bytes
+from recorder.store.room import Disk, Limits, RoomToCome, disk_of, stored, used_bytes
 
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")
@@ -44,22 +45,41 @@ class Housekeeping:
         self._catalogue = catalogue
         self._ring = ring
         self._limits = Limits(settings.room.quota_bytes, settings.room.min_free_bytes)
+        self._to_come = RoomToCome()
+        self._summed_at = -1
+        self._deletable_bytes = 0
         self.room = Room()
 
     async def measure(self) -> Room:
         """Measures the room anew; where that is impossible, the former one stands."""
-        self.room = await attempt("the room on the disk is unknown", self._measured) or self.room
+        before = self.room
+        self.room = await attempt("the room on the disk is unknown", self._measured) or before
+        self._to_come.came(self.room.bytes - before.bytes)
         return self.room
 
-    async def make_room(self, need: int) -> bool:
-        """Deletes in the order of retention until there is room; returns whether there is."""
+    async def make_room(self, need: int, *, recordings: bool = True) -> bool:
+        """Deletes in the order of retention until there is room; returns whether there is.
+
+        Some file systems give the room back only later, as all do of a file that is being exported: for half
+        a minute it counts as room, so that no further recording goes for it.
+
+        Args:
+            need: in bytes.
+            recordings: whether they may go, too; else segments of the ring alone.
+        """
         await self.measure()
-        for each in in_order(self._keepables()):
-            if self.room.bytes >= need:
+        if self._expected_bytes >= need:
+            return True
+        deletable = await attempt(
+            "what may be deleted is unknown", lambda: self._deletable(recordings=recordings)
+        )
+        for each, freed in deletable or ():
+            if self._expected_bytes >= need:
                 break
-            await attempt(f"{each.name} stays", lambda name=each.name: self._let_go(name))  # type: ignore[misc]
-            await self.measure()
-        return self.room.bytes >= need
+            if await attempt(f"{each.name} stays", lambda each=each: self._let_go(each)):  # type: ignore[misc]
+                self._to_come.expect(freed, time.monotonic())
+                await self.measure()
+        return self._expected_bytes >= need
 
     async def need_room(self) -> None:
         """Makes room for something new.
@@ -73,36 +93,61 @@ class Housekeeping:
                 Reason.DISK_FULL,
             )
 
+    @property
+    def deletable_bytes(self) -> int:
+        """What recordings take that may be deleted to make room; a file that several share counts once."""
+        if self._summed_at != self._catalogue.revision:
+            self._summed_at, self._deletable_bytes = self._catalogue.revision, self._sum_of_deletable()
+        return self._deletable_bytes
+
+    def _sum_of_deletable(self) -> int:
+        recordings = list(self._catalogue.all.values())
+        kept = {file.sha256 for each in recordings if not _may_go(each) for file in each.files}
+        going = {file.sha256: file.size for each in recordings if _may_go(each) for file in each.files}
+        return sum(size for sha256, size in going.items() if sha256 not in kept)
+
     def _measured(self) -> Room:
         disk = disk_of(self._settings.root)
         used = used_bytes(self._settings.folders) if self._limits.quota_bytes else 0
         return Room(self._limits.room_bytes(used, disk), disk)
 
-    def _keepables(self) -> list[Keepable]:
+    @property
+    def _expected_bytes(self) -> int:
+        return self.room.bytes + self._to_come.bytes(time.monotonic())
+
+    def _deletable(self, *, recordings: bool) -> list[tuple[Keepable, int]]:
         found = [
-            Keepable(each.path.name, each.ended_ns, ring=True)
+            Keepable(each.path.name, each.ended_ns, ring=True, files=stored([each.path]))
             for each in (self._ring.segments if self._ring else ())
         ]
-        recordings = [
-            Keepable(
-                manifest.id,
-                manifest.ended_unix_ms,
-                open=manifest.state.open,
-                pinned=manifest.pinned,
-                to_copy=manifest.copied.outstanding,
-                copied=manifest.copied.state is CopyState.VERIFIED,
-            )
-            for manifest in self._catalogue.all.values()
-        ]
-        return found + recordings
+        if recordings:
+            found += [self._keepable(manifest) for manifest in list(self._catalogue.all.values())]
+        return frees(in_order(found))
 
-    def _let_go(self, name: str) -> None:
-        if manifest := self._catalogue.get(name):
-            _log.warning("deleted %s to make room", name)
+    def _keepable(self, manifest: Manifest) -> Keepable:
+        folder = self._catalogue.folder_of(manifest)
+        return Keepable(
+            manifest.id,
+            manifest.ended_unix_ms,
+            ordinal=manifest.ordinal,
+            open=manifest.state.open,
+            pinned=manifest.pinned,
+            to_copy=manifest.copied.outstanding,
+            copied=manifest.copied.state is CopyState.VERIFIED,
+            files=stored(folder / file.name for file in manifest.files),
+        )
+
+    def _let_go(self, each: Keepable) -> bool:
+        """Deletes something; returns whether it was still there."""
+        if manifest := self._catalogue.get(each.name):
+            _log.warning("deleted %s to make room", each.name)
             self._catalogue.delete(manifest)
-        elif self._ring:
-            for segment in [each for each in self._ring.segments if each.path.name == name]:
-                self._ring.drop(segment)
+            return True
+        return self._ring is not None and self._ring.drop_named(each.name)
+
+
+def _may_go(manifest: Manifest) -> bool:
+    return not (manifest.state.open or manifest.pinned or manifest.copied.outstanding)
 
 
 async def attempt(otherwise: str, work: Callable[[], _T]) -> _T | None:

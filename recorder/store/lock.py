@@ -14,9 +14,14 @@ _LOCK: Final = "lock"
 _MODE: Final = 0o640
 
 
+def has_lock(folder: Path) -> bool:
+    """Returns whether a folder has the file of such a lock."""
+    return (folder / _LOCK).is_file()
+
+
 @contextmanager
 def folder_lock(root: Path) -> Iterator[None]:
-    """Holds the lock of a folder of recordings, which is made if it is missing.
+    """Holds the lock of a folder of recordings, or of a ring of its own, which is made if it is missing.
 
     Raises:
         UserError: another recorder has the folder, or it can't be used.

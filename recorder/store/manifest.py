@@ -1,6 +1,7 @@
 """What is known of a recording besides its content: one JSON file in its folder, replaced atomically."""
 
 import hashlib
+import json
 from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import Final, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from recorder.mcap.records import note_of_gap
 from recorder.store.folder import ID, MANIFEST, SEGMENT, replace_file, segment_number
 from recorder.values import VIDEO_TOPIC, ChannelSummary, Gap, GapCause, SegmentSummary
 
@@ -121,6 +123,8 @@ class Manifest(_Part):
 
     Attributes:
         id: as RecordingService defines it.
+        ordinal: greater than that of all recordings that were made before on this disk, whatever the calendar
+            said; 0 if unknown.
         trigger: who or what caused a snapshot or an incident.
         max_duration_s, max_bytes: where it stops by itself; 0 for no limit.
         numbered: whether the middleware numbers the messages, so that losses can be counted.
@@ -131,6 +135,7 @@ class Manifest(_Part):
     """
 
     id: str = Field(pattern=f"^{ID.pattern}$")
+    ordinal: int = Field(default=0, ge=0)
     label: str = ""
     notes: str = ""
     kind: Kind
@@ -204,6 +209,24 @@ class Manifest(_Part):
             return b""
         lines = [f"{file.sha256}  {file.name}\n" for file in self.files]
         return hashlib.sha256("".join(lines).encode()).digest()
+
+    @property
+    def about(self) -> dict[str, str]:
+        """What is known of it besides its content, as texts by name; what is empty is left out."""
+        gaps = [dict(note_of_gap(gap).values) for gap in self.all_gaps]
+        texts = {
+            "id": self.id,
+            "kind": self.kind.value,
+            "label": self.label,
+            "notes": self.notes,
+            "preset": self.preset,
+            "trigger": self.trigger,
+            "state": self.state.value,
+            "stop_reason": self.stop_reason.value if self.stop_reason else "",
+            "boot_id": self.boot_id,
+            "gaps": json.dumps(gaps) if gaps else "",
+        }
+        return {name: text for name, text in texts.items() if text}
 
     def with_segment(self, name: str, summary: SegmentSummary) -> Self:
         """Returns the manifest with one more segment, or with one in place of that of the same name."""

@@ -1,7 +1,23 @@
 """What is deleted first to make room. Pure."""
 
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Stored:
+    """A file on the disk, which other names may share.
+
+    Attributes:
+        inode: device and number (stat(2)); the same for all names of a file.
+        links: how many names it has.
+        bytes: that it takes on the disk.
+    """
+
+    inode: tuple[int, int]
+    links: int
+    bytes: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -10,21 +26,25 @@ class Keepable:
 
     Attributes:
         name: a recording's ID, or a ring segment's file name.
-        ended_ns: the older one of two alike goes first.
+        ordinal: of two alike the one that was made first goes first; 0 if unknown: before all others.
+        ended_ns: then the older one.
         ring: whether it is a segment of the ring.
         open: whether it is being written.
         pinned: whether a person has pinned it.
         to_copy: whether a copy of it is wanted and not confirmed yet.
         copied: whether a copy of it is confirmed.
+        files: that it consists of.
     """
 
     name: str
     ended_ns: int
+    ordinal: int = 0
     ring: bool = False
     open: bool = False
     pinned: bool = False
     to_copy: bool = False
     copied: bool = False
+    files: tuple[Stored, ...] = ()
 
     @property
     def may_go(self) -> bool:
@@ -33,14 +53,30 @@ class Keepable:
 
 
 def in_order(candidates: Iterable[Keepable]) -> list[Keepable]:
-    """Returns what may be deleted: the ring, then what has been copied, then the rest; the oldest first.
-
-    A caller deletes one, measures, and goes on while room is short: segments may share their blocks with
-    others.
-    """
+    """Returns what may be deleted: the ring, then what has been copied, then the rest; the oldest first."""
     return sorted((each for each in candidates if each.may_go), key=_rank)
 
 
-def _rank(each: Keepable) -> tuple[int, int, str]:
+def frees(order: Sequence[Keepable]) -> list[tuple[Keepable, int]]:
+    """Returns what helps to make room, with the bytes that each frees when those before it are gone.
+
+    A file takes its room until its last name is gone. What shares all of its files with something that
+    stays is left out: deleting it would free nothing.
+    """
+    names = Counter(file.inode for each in order for file in each.files)
+    left = {file.inode: file.links for each in order for file in each.files}
+    found = []
+    for each in order:
+        if not any(names[file.inode] >= file.links for file in each.files):
+            continue
+        freed = 0
+        for file in each.files:
+            left[file.inode] -= 1
+            freed += 0 if left[file.inode] else file.bytes
+        found.append((each, freed))
+    return found
+
+
+def _rank(each: Keepable) -> tuple[int, int, int, str]:
     group = 0 if each.ring else 1 if each.copied else 2
-    return group, each.ended_ns, each.name
+    return group, each.ordinal, each.ended_ns, each.name

@@ -1,10 +1,12 @@
 """The ring: segments of a few seconds, kept for some minutes. A snapshot has hard links of them."""
 
 import errno
+import logging
 import os
 import re
 import shutil
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -15,10 +17,15 @@ from recorder.mcap.records import PART
 from recorder.mcap.recovery import recover
 from recorder.store.folder import files_named, make_directory, segment_name
 from recorder.store.manifest import Manifest
+from recorder.store.room import is_full
 from recorder.values import SegmentSummary
+
+_log = logging.getLogger(__name__)
 
 SEGMENT_S: Final = 10.0
 _NAME: Final = re.compile(r"\d{8}\.mcap")
+_WITHOUT_LINKS: Final = (errno.EXDEV, errno.EPERM, errno.EMLINK, errno.EOPNOTSUPP)
+"""link(2): between file systems, on one without hard links (FAT), or too many of one file already."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,12 +58,22 @@ class Ring:
     def __init__(self, directory: Path, seconds: int) -> None:
         self.directory = directory
         self._kept_ns = seconds * 1_000_000_000
+        self._next_number = 0
+        self._loaded_ns = 0
+        self._left = 0
+        """Segments with lower numbers are of a former process."""
         self.segments: list[RingSegment] = []
 
     @property
     def next_number(self) -> int:
         """The number of the segment to begin next."""
-        return self.segments[-1].number + 1 if self.segments else 0
+        return self._next_number
+
+    @property
+    def newest_ns(self) -> int:
+        """The log time of the newest message; 0 without one."""
+        lasts = [each.summary.last_ns for each in self.segments if each.summary.last_ns is not None]
+        return max(lasts, default=0)
 
     @staticmethod
     def name(number: int) -> str:
@@ -72,26 +89,33 @@ class Ring:
         make_directory(self.directory)
         self.segments = []
         for path in files_named(self.directory, _NAME):
-            self._take(path, summarise(path))
+            self._take(path, summarise)
         self.recover()
+        self._loaded_ns, self._left = time.monotonic_ns(), self._next_number
 
     def recover(self) -> list[RingSegment]:
         """Makes segments whole that were cut off, and returns them.
 
         Raises:
-            OSError: the directory can't be read or written.
+            OSError: the directory can't be read or written, or the disk is full.
         """
-        found = [self._take(path, recover(path)) for path in files_named(self.directory, _NAME, PART)]
+        make_directory(self.directory)
+        found = [self._take(path, recover) for path in files_named(self.directory, _NAME, PART)]
         self.segments.sort(key=lambda each: each.number)
         return [segment for segment in found if segment]
 
     def add(self, segment: RingSegment) -> None:
         """Takes a segment that has become final."""
         self.segments.append(segment)
+        self._next_number = max(self._next_number, segment.number + 1)
 
     def outdated(self, now_ns: int) -> list[RingSegment]:
-        """Returns the segments that are older than what is kept."""
-        return [each for each in self.segments if each.ended_ns < now_ns - self._kept_ns]
+        """Returns the segments that are older than what is kept.
+
+        What a former process has left is kept for as long from the start on: it is what led to a power cut.
+        """
+        since_ns = now_ns - self._kept_ns
+        return [each for each in self.segments if self._kept_from_ns(each) < since_ns]
 
     def drop(self, segment: RingSegment) -> None:
         """Deletes a segment; snapshots that have it keep it.
@@ -102,6 +126,17 @@ class Ring:
         self.segments.remove(segment)
         segment.path.unlink(missing_ok=True)
 
+    def drop_named(self, name: str) -> bool:
+        """Deletes the segment whose file has that name; returns whether there was one.
+
+        Raises:
+            OSError: the disk fails.
+        """
+        found = [each for each in self.segments if each.path.name == name]
+        for segment in found:
+            self.drop(segment)
+        return bool(found)
+
     def within(self, from_ns: int, until_ns: int) -> list[RingSegment]:
         """Returns the segments of which a part lies in a window, in order."""
         return [each for each in self.segments if each.overlaps(from_ns, until_ns)]
@@ -111,21 +146,40 @@ class Ring:
         segments = list(self.segments)
         return now_ns - segments[0].began_ns if segments else 0
 
-    def _take(self, path: Path, summary: SegmentSummary | None) -> RingSegment | None:
-        if summary is None or summary.first_ns is None or summary.last_ns is None:
-            path.unlink(missing_ok=True)  # Without a message, or damaged beyond use.
+    def _kept_from_ns(self, segment: RingSegment) -> int:
+        return max(segment.ended_ns, self._loaded_ns) if segment.number < self._left else segment.ended_ns
+
+    def _take(self, path: Path, summary_of: Callable[[Path], SegmentSummary | None]) -> RingSegment | None:
+        number = int(path.name[:8])
+        self._next_number = max(self._next_number, number + 1)
+        try:
+            summary = summary_of(path)
+            if summary is None or summary.first_ns is None or summary.last_ns is None:
+                path.unlink(missing_ok=True)  # Without a message, or damaged beyond use.
+                return None
+        except OSError as error:
+            if is_full(error):
+                raise
+            _log.warning("%s can't be read and is left out of the ring: %s", path, error.strerror or error)
             return None
         # Its instants are known by the calendar clock alone.
         offset_ns = time.monotonic_ns() - time.time_ns()
-        segment = RingSegment(
-            int(path.name[:8]), summary.first_ns + offset_ns, summary.last_ns + offset_ns, summary
-        )
+        segment = RingSegment(number, summary.first_ns + offset_ns, summary.last_ns + offset_ns, summary)
         self.segments.append(segment)
         return segment
 
 
+def has_segments(folder: Path) -> bool:
+    """Returns whether a folder has segments of a ring, or unfinished ones.
+
+    Raises:
+        OSError: it can't be read.
+    """
+    return any(_NAME.fullmatch(path.name.removesuffix(PART)) for path in folder.iterdir())
+
+
 def link(source: Path, target: Path) -> None:
-    """Gives a file a second name; a copy where the two are in different file systems.
+    """Gives a file a second name; a copy where the file system has none, or the two are in different ones.
 
     Raises:
         OSError: the disk is full or fails.
@@ -133,10 +187,14 @@ def link(source: Path, target: Path) -> None:
     try:
         os.link(source, target)
     except OSError as error:
-        if error.errno != errno.EXDEV:
+        if error.errno not in _WITHOUT_LINKS:
             raise
         _copy(source, target)
-    sync_directory(target.parent)
+    try:
+        sync_directory(target.parent)
+    except OSError:
+        target.unlink(missing_ok=True)  # So that the name is free for the next attempt.
+        raise
 
 
 def link_next(folder: Path, manifest: Manifest, segment: RingSegment) -> Manifest:

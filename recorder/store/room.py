@@ -1,18 +1,29 @@
 """How much may still be written: the quota, the space that stays free, a reserve for closing files."""
 
+import errno
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from recorder.store.retention import Stored
+
 _GIB: Final = 1024**3
 _MIN_FREE_SHARE: Final = 0.05
 RESERVE_BYTES: Final = 2 * 1024 * 1024
 """The index of a segment with some hundred channels takes some hundred KiB, a manifest less."""
 _RESERVE: Final = "reserve"
+_FULL: Final = (errno.ENOSPC, errno.EDQUOT)
+_TO_COME_WITHIN_S: Final = 30.0
+"""Btrfs frees when it commits: every 30 s by default (btrfs(5), "commit")."""
 _BLOCK: Final = 512
 """Unit of st_blocks (stat(2))."""
+
+
+def is_full(error: OSError) -> bool:
+    """Returns whether an error means that the disk, or this user's share of it, is full."""
+    return error.errno in _FULL
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +82,39 @@ def used_bytes(folders: Iterable[Path]) -> int:
                     continue  # It has gone meanwhile.
                 seen[status.st_dev, status.st_ino] = status.st_blocks * _BLOCK
     return sum(seen.values())
+
+
+def stored(paths: Iterable[Path]) -> tuple[Stored, ...]:
+    """Returns these files as they lie on the disk, without those that are missing."""
+    found = []
+    for path in paths:
+        try:
+            status = path.lstat()
+        except FileNotFoundError:
+            continue
+        found.append(Stored((status.st_dev, status.st_ino), status.st_nlink, status.st_blocks * _BLOCK))
+    return tuple(found)
+
+
+class RoomToCome:
+    """What has been deleted, but the disk does not show as free yet."""
+
+    def __init__(self) -> None:
+        self._bytes = 0
+        self._until_s = 0.0
+
+    def expect(self, freed_bytes: int, now_s: float) -> None:
+        """Takes note of a deletion; `now_s` are monotonic seconds."""
+        self._bytes = self.bytes(now_s) + freed_bytes
+        self._until_s = now_s + _TO_COME_WITHIN_S
+
+    def came(self, more_bytes: int) -> None:
+        """Takes note of room that the disk shows in addition."""
+        self._bytes = max(0, self._bytes - max(0, more_bytes))
+
+    def bytes(self, now_s: float) -> int:
+        """Returns what is still to come; 0 when it has not come for half a minute."""
+        return self._bytes if now_s < self._until_s else 0
 
 
 class Reserve:

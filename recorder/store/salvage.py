@@ -7,64 +7,89 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from recorder.mcap.reading import summarise
 from recorder.mcap.records import PART
-from recorder.mcap.recovery import recover
+from recorder.mcap.recovery import is_untouched, recover
 from recorder.mcap.rosbag2 import metadata
-from recorder.store.catalogue import Catalogue, segments_in
-from recorder.store.folder import DATA, METADATA, replace_file
+from recorder.store.catalogue import Catalogue, readable, segments_in
+from recorder.store.folder import DATA, METADATA, put_aside, replace_file
 from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason, file_of
 from recorder.store.ring import RingSegment, link_next
+from recorder.store.room import is_full
 from recorder.values import Gap, GapCause
 
 _log = logging.getLogger(__name__)
 _NS_PER_MS: Final = 1_000_000
-_EMPTY_BYTES: Final = 1024 * 1024
-"""More than the definitions of a segment's types take."""
 
 
 def whole(folder: Path, manifest: Manifest) -> Manifest:
     """Returns the manifest with all segments that the folder has, after unfinished ones have got their index.
 
+    One that can't be made whole costs no other one: a gap stands for it.
+
     Raises:
-        OSError: the disk is full or fails; what has been made whole by then stays so.
+        OSError: the disk is full; what has been made whole by then stays so.
     """
     for part in segments_in(folder, PART):
-        name = f"{DATA}/{part.name.removesuffix(PART)}"
-        summary = recover(part)
-        if summary is None:
-            put_aside(part)
-            continue
-        _log.info("recovered %s: %d messages", summary.path, summary.messages)
-        manifest = manifest.with_segment(name, summary)
+        manifest = _with_part(manifest, part)
     known = {segment.name for segment in manifest.segments}
     for path in segments_in(folder):
         name = f"{DATA}/{path.name}"
-        if name not in known and (summary := summarise(path)):
+        if name not in known and (summary := readable(path)):
             manifest = manifest.with_segment(name, summary)
     return manifest
 
 
-def put_aside(part: Path) -> None:
-    """Deletes an unfinished segment without a message; a long one, whose damage hides them, is kept aside."""
-    if part.stat().st_size <= _EMPTY_BYTES:
+def _with_part(manifest: Manifest, part: Path) -> Manifest:
+    """Returns the manifest with an unfinished segment, or with a gap for one that can't be made whole."""
+    try:
+        summary = recover(part)
+        if summary is None:
+            _clear_away(part)
+    except FileExistsError:
+        _log.error("%s: another file has its final name; it is kept as %s", part, put_aside(part).name)
+        return _without(manifest, part)
+    except OSError as error:
+        if is_full(error):
+            raise
+        _log.error("%s can't be made whole, and is tried again at the next start: %s", part, error.strerror)
+        return _without(manifest, part)
+    if summary is None:
+        return manifest
+    _log.info("recovered %s: %d messages", summary.path, summary.messages)
+    return manifest.with_segment(f"{DATA}/{summary.path.name}", summary)
+
+
+def _clear_away(part: Path) -> None:
+    """Deletes an unfinished segment that nothing was written to; keeps a damaged one aside."""
+    if is_untouched(part):
         part.unlink()
-        return
-    aside = part.with_suffix(".damaged")
-    _log.warning("%s can't be recovered and is kept as %s", part, aside.name)
-    part.rename(aside)
+    else:
+        _log.warning("%s can't be recovered and is kept as %s", part, put_aside(part).name)
+
+
+def _without(manifest: Manifest, part: Path) -> Manifest:
+    """Returns the manifest with a gap for an unfinished segment: between the messages on both sides of it."""
+    name = f"{DATA}/{part.name.removesuffix(PART)}"
+    before = [each.last_ns for each in manifest.segments if each.name < name and each.last_ns is not None]
+    behind = [each.first_ns for each in manifest.segments if each.name > name and each.first_ns is not None]
+    began_ns = max(before, default=manifest.started_unix_ms * _NS_PER_MS)
+    gap = Gap("", GapCause.DISK, began_ns, max(began_ns, min(behind, default=began_ns)), None)
+    return manifest if gap in manifest.gaps else manifest.model_copy(update={"gaps": (*manifest.gaps, gap)})
 
 
 def ended(folder: Path, manifest: Manifest, state: RecordingState, reason: StopReason) -> Manifest:
     """Returns the manifest of a recording that has ended, and writes rosbag2's file beside its segments.
 
+    A copy has that file, and the manifest not: what else is known of the recording is in both.
+
     Raises:
         OSError: the disk is full or fails.
     """
-    text = metadata(manifest.summaries(folder)).encode()
+    update = {"state": state, "stop_reason": reason}
+    done = _until_next_messages(manifest.model_copy(update=update)).spanning()
+    text = metadata(done.summaries(folder), done.about).encode()
     replace_file(folder / METADATA, text)
-    update = {"state": state, "stop_reason": reason, "metadata": file_of(METADATA, text)}
-    return _until_next_messages(manifest.model_copy(update=update)).spanning()
+    return done.model_copy(update={"metadata": file_of(METADATA, text)})
 
 
 def salvage(catalogue: Catalogue, ring: Iterable[RingSegment], boot_id: str) -> Manifest | None:
@@ -79,34 +104,55 @@ def salvage(catalogue: Catalogue, ring: Iterable[RingSegment], boot_id: str) -> 
         The recording that is to go on: it ran during the same boot.
 
     Raises:
-        OSError: the disk is full or fails.
+        OSError: the disk is full. One that fails in another way costs the recordings alone that it fails.
     """
     goes_on: Manifest | None = None
     segments = list(ring)
     for manifest in sorted(catalogue.all.values(), key=lambda each: each.id):
-        folder = catalogue.folder_of(manifest)
-        if not manifest.state.open and not segments_in(folder, PART):
-            continue
-        found = whole(folder, manifest)
-        if manifest.window_ns:
-            found = _with_ring(folder, found, segments)
-        running = manifest.state is RecordingState.RECORDING and manifest.kind is Kind.MANUAL
-        if running and manifest.boot_id == boot_id and boot_id:
-            if goes_on:
+        try:
+            running = _salvaged(catalogue, manifest, segments, boot_id)
+            if running and goes_on:
                 _interrupted(catalogue, goes_on)
-            goes_on = found
-            catalogue.write(found)
-        elif manifest.state.open:
-            _interrupted(catalogue, found)
-        else:
-            catalogue.write(ended(folder, found, found.state, found.stop_reason or StopReason.ERROR))
+            goes_on = running or goes_on
+        except OSError as error:
+            if is_full(error):
+                raise
+            catalogue.set_aside(manifest, error)
     return goes_on
 
 
+def _salvaged(
+    catalogue: Catalogue, manifest: Manifest, ring: list[RingSegment], boot_id: str
+) -> Manifest | None:
+    """Makes one recording whole, and returns it if it is to go on."""
+    folder = catalogue.folder_of(manifest)
+    if not manifest.state.open and not segments_in(folder, PART):
+        return None
+    found = whole(folder, manifest)
+    if manifest.window_ns:
+        found = _with_ring(folder, found, ring)
+    running = manifest.state is RecordingState.RECORDING and manifest.kind is Kind.MANUAL
+    if running and manifest.boot_id == boot_id and boot_id:
+        catalogue.write(found)
+        return found
+    if manifest.state.open:
+        _interrupted(catalogue, found)
+    else:
+        catalogue.write(ended(folder, found, found.state, found.stop_reason or StopReason.ERROR))
+    return None
+
+
 def _interrupted(catalogue: Catalogue, manifest: Manifest) -> None:
-    cut = manifest if manifest.window_ns else with_interruption(manifest, None)
+    cut = _with_rest_of_window(manifest) if manifest.window_ns else with_interruption(manifest, None)
     folder = catalogue.folder_of(manifest)
     catalogue.write(ended(folder, cut, RecordingState.RECOVERED, StopReason.INTERRUPTED))
+
+
+def _with_rest_of_window(manifest: Manifest) -> Manifest:
+    """Returns a snapshot's manifest with a gap from its newest message to the end of its window."""
+    _, until_ns = manifest.window_ns or (0, 0)
+    complete = any((each.last_ns or 0) >= until_ns for each in manifest.segments)
+    return manifest if complete else with_interruption(manifest, until_ns)
 
 
 def with_interruption(manifest: Manifest, until_ns: int | None) -> Manifest:
@@ -114,7 +160,8 @@ def with_interruption(manifest: Manifest, until_ns: int | None) -> Manifest:
 
     Args:
         manifest: of a recording that was cut off.
-        until_ns: when it goes on, by the calendar clock; None: never, and how much is missing is unknown.
+        until_ns: when it goes on, or was to end, by the calendar clock; None: never, and how much is missing
+            is unknown.
     """
     lasts = [each.last_ns for each in manifest.segments if each.last_ns is not None]
     began_ns = max(lasts, default=manifest.started_unix_ms * _NS_PER_MS)

@@ -18,7 +18,7 @@ _NAME: Final = "state.json"
 
 
 class Answer(BaseModel):
-    """What a request was answered. `at_s` is of the calendar clock, which outlives a restart."""
+    """What a request was answered; `at_s` are monotonic seconds of that boot of the computer."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -26,6 +26,8 @@ class Answer(BaseModel):
     recording_id: str
     message: str
     at_s: float
+    boot_id: str = ""
+    """Empty if unknown, as in files of former releases."""
 
 
 class _Content(BaseModel):
@@ -36,12 +38,16 @@ class _Content(BaseModel):
 class StateFile:
     """Answers by request ID, and bytes a minute by preset.
 
+    Ages are of the monotonic clock: the calendar may be set at any time.
+
     Args:
         root: the folder of recordings.
+        boot_id: of the computer; empty if unknown.
     """
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, boot_id: str = "") -> None:
         self._path = root / _NAME
+        self._boot_id = boot_id
         self._content = _Content()
 
     def load(self) -> None:
@@ -61,11 +67,16 @@ class StateFile:
     def answered(self, method: str, request_id: str, now_s: float) -> Answer | None:
         """Returns the answer to an earlier request with this ID; None if it is new.
 
+        Args:
+            method: that is requested.
+            request_id: of the caller.
+            now_s: monotonic seconds.
+
         Raises:
             InvalidRequestError: the ID was used for another method.
         """
         answer = self._content.answers.get(request_id)
-        if answer is None or not 0 <= now_s - answer.at_s < REMEMBERED_S:
+        if answer is None or not self._is_remembered(answer, now_s):
             return None
         if answer.method != method:
             raise InvalidRequestError(
@@ -76,13 +87,16 @@ class StateFile:
     def remember(self, request_id: str, answer: Answer) -> None:
         """Keeps an answer, and forgets those of more than 10 minutes ago."""
         kept = {
-            each: old
-            for each, old in self._content.answers.items()
-            if 0 <= answer.at_s - old.at_s < REMEMBERED_S
+            each: old for each, old in self._content.answers.items() if self._is_remembered(old, answer.at_s)
         }
         while len(kept) >= _MAX_ANSWERS:
             del kept[next(iter(kept))]
         self._content.answers = {**kept, request_id: answer}
+
+    def _is_remembered(self, answer: Answer, now_s: float) -> bool:
+        # One of an earlier boot is older than this boot, which began at 0: it is remembered rather too long.
+        age_s = now_s - answer.at_s if answer.boot_id == self._boot_id else now_s
+        return age_s < REMEMBERED_S
 
     def measure(self, preset: str, bytes_per_minute: int) -> None:
         """Keeps what a preset takes."""

@@ -74,6 +74,7 @@ class Stream:
 
     Args:
         of: the channel.
+        now: from when on frames are wanted.
 
     Attributes:
         running: whether the preview says that frames flow.
@@ -81,13 +82,14 @@ class Stream:
         frames: samples so far.
     """
 
-    def __init__(self, of: Channel) -> None:
+    def __init__(self, of: Channel, now: Now) -> None:
         self.running = False
         self.error = ""
         self.frames = 0
         self._channel = of
         self._codec: Codec | None = None
         self._awaits_key_frame = True
+        self._wanted_ns = now.calendar_ns
         self._last_ns: int | None = None
         """Capture time of the newest sample, by the calendar clock."""
         self._missing_since_ns: int | None = None
@@ -100,8 +102,17 @@ class Stream:
         if self._missing_since_ns is None:
             self._missing_since_ns = now.calendar_ns if self._last_ns is None else self._last_ns
 
+    def loss_so_far(self, now: Now) -> list[Item]:
+        """Returns the loss up to now, if frames are missing; it lasts on until the next frame."""
+        if self._missing_since_ns is None and not (self.running and self.frames):
+            self._missing_since_ns = self._wanted_ns if self._last_ns is None else self._last_ns
+        losses = self._loss_until(now.calendar_ns)
+        if losses:
+            self._missing_since_ns = now.calendar_ns
+        return losses
+
     def end(self, now: Now) -> list[Item]:
-        """Returns the loss that lasts at the end of the recording, if there is one."""
+        """Returns the loss that lasts when no more frames are wanted, if there is one."""
         return self._loss_until(now.calendar_ns)
 
     def take(self, header: Header, payload: bytes, now: Now) -> list[Item]:

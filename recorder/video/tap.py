@@ -59,7 +59,7 @@ class Tap:
         self.last_error = ""
         self._socket = socket
         self._put = put
-        self._stream = Stream(channel(presets))
+        self._stream = Stream(channel(presets), _now())
         self._backoff = Backoff(_FIRST_RETRY_S, _LONGEST_RETRY_S)
 
     @property
@@ -71,6 +71,10 @@ class Tap:
     def problem(self) -> str:
         """Why no frames come, as far as is known: of the connection, or the preview's own; else empty."""
         return self.last_error or ("" if self._stream.running else self._stream.error)
+
+    def catch_up(self) -> None:
+        """Hands over the loss so far, if frames are missing at present."""
+        self._put(self._stream.loss_so_far(_now()))
 
     async def run(self) -> NoReturn:
         """Records until it is cancelled."""

@@ -72,6 +72,7 @@ class Progress:
         lost: messages lost; None if that is unknown.
         gaps: how many losses were recorded.
         numbered: whether all messages so far were numbered.
+        last_ns: log time of the newest message; before the first, when the output was opened.
     """
 
     part: Path | None = None
@@ -82,6 +83,7 @@ class Progress:
     lost: int | None = 0
     gaps: int = 0
     numbered: bool = True
+    last_ns: int = 0
 
 
 class Output:
@@ -117,6 +119,7 @@ class Output:
         self._lost: int | None = 0
         self._gaps = 0
         self._numbered = True
+        self._last_ns = 0
         self._fresh = True
         """Whether nothing but its head is in the present segment."""
 
@@ -129,6 +132,7 @@ class Output:
         now_ns, calendar_ns = time.monotonic_ns(), time.time_ns()
         self._path = self.shape.directory / self.shape.name(self._number)
         self._began_ns = now_ns
+        self._last_ns = self._last_ns or calendar_ns
         self._clock_offset_ns = calendar_ns - now_ns
         pair = Note("clock", {"monotonic_ns": str(now_ns), "unix_ns": str(calendar_ns)})
         head = self._head()
@@ -221,6 +225,7 @@ class Output:
         segment.write(sample)
         self._fresh = False
         self._messages += 1
+        self._last_ns = sample.log_time_ns
         if sample.channel.topic == VIDEO_TOPIC:
             self._frames += 1
         elif not sample.sequence:
@@ -246,4 +251,5 @@ class Output:
             lost=self._lost,
             gaps=self._gaps,
             numbered=self._numbered,
+            last_ns=self._last_ns,
         )

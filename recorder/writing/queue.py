@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-from recorder.values import Channel, GapCause, Item, Loss, Note, Sample
+from recorder.values import Channel, Ended, GapCause, Item, Loss, Note, Sample
 
 _OVERHEAD_BYTES: Final = 256
 """Of a message's objects in memory, roughly."""
@@ -73,6 +73,8 @@ class SampleQueue:
             self._merge(Loss(item.channel, GapCause.QUEUE, at_ns, at_ns, 1))
         elif isinstance(item, Loss):
             self._merge(item)
+        elif isinstance(item, Ended):
+            self._items.append(item)  # There is at most one for each subscription.
         else:
             self._notes[item.name] = item
 

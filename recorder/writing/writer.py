@@ -6,9 +6,9 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future
-from typing import Final, Protocol, TypeVar
+from typing import Any, Final, Protocol, TypeVar
 
-from recorder.values import Item, Note, Sample
+from recorder.values import Channel, Ended, Item, Note, Sample
 from recorder.writing.output import Head, Output
 from recorder.writing.queue import SampleQueue
 
@@ -21,11 +21,21 @@ _JOIN_S: Final = 10.0
 _MAX_NOTES: Final = 32
 
 
+class WriterEndedError(RuntimeError):
+    """The writer's thread has ended: by a defect, which is in the log, or because it was stopped."""
+
+    def __init__(self) -> None:
+        super().__init__("the writer has ended")
+
+
 class Latched(Protocol):
     """Keeps the newest messages of latched topics."""
 
     def take(self, sample: Sample) -> None:
         """Takes a message of a latched topic."""
+
+    def forget(self, channel: Channel) -> None:
+        """Forgets the messages of a topic that is no longer taken."""
 
     def samples(self) -> Iterable[Sample]:
         """Returns the messages that a late subscriber would get."""
@@ -52,7 +62,10 @@ class Writer:
         self._outputs: list[Output] = []
         self._notes: dict[str, Note] = {}
         """The newest of each name: what still holds when a segment begins."""
-        self._jobs: deque[Callable[[], None]] = deque()
+        self._jobs: deque[_Job] = deque()
+        self._submitting = threading.Lock()
+        self._ended = False
+        """Whether no further job is done; under the lock."""
         self._stopping = False
         self._thread = threading.Thread(target=self._run, name="writer")
 
@@ -105,35 +118,56 @@ class Writer:
         return self._thread.is_alive()
 
     def _submit(self, work: Callable[[], _T]) -> "Future[_T]":
-        future: Future[_T] = Future()
-
-        def job() -> None:
-            try:
-                future.set_result(work())
-            except OSError as error:
-                future.set_exception(error)
-
-        self._jobs.append(job)
+        """Has the thread do something; the future fails with its OSError, or with WriterEndedError."""
+        job = _Job(work)
+        with self._submitting:
+            if self._ended:
+                job.future.set_exception(WriterEndedError())
+            else:
+                self._jobs.append(job)
         self._queue.wake()
-        return future
+        return job.future
 
     def _run(self) -> None:
+        try:
+            self._work()
+        finally:
+            # Whoever waits would do so for ever.
+            with self._submitting:
+                self._ended = True
+            for job in self._jobs:
+                job.future.set_exception(WriterEndedError())
+            for output in self._outputs:
+                output.abandon()
+
+    def _work(self) -> None:
         flush_at_s = time.monotonic() + FLUSH_S
         while not (self._stopping and not self._jobs):
             # Before the items: what was put before a job was submitted is written before the job.
             jobs = len(self._jobs)
             for item in self._queue.take(0.0 if jobs else max(0.0, flush_at_s - time.monotonic())):
                 self._write(item)
+                # Also within what has waited: on a slow disk it takes seconds.
+                flush_at_s = self._flush_if_due(flush_at_s)
             for _ in range(jobs):
-                self._jobs.popleft()()
-            if time.monotonic() >= flush_at_s:
-                self._each(Output.flush, *self._outputs)
-                flush_at_s = time.monotonic() + FLUSH_S
+                self._jobs[0].run()
+                self._jobs.popleft()
+            flush_at_s = self._flush_if_due(flush_at_s)
+
+    def _flush_if_due(self, at_s: float) -> float:
+        """Flushes all outputs when it is due; returns when it is due next."""
+        if time.monotonic() < at_s:
+            return at_s
+        self._each(Output.flush, *self._outputs)
+        return time.monotonic() + FLUSH_S
 
     def _write(self, item: Item) -> None:
         if isinstance(item, Sample):
             if item.channel.latched:
                 self._latched.take(item)
+        elif isinstance(item, Ended):
+            self._latched.forget(item.channel)
+            return
         elif isinstance(item, Note) and (item.name in self._notes or len(self._notes) < _MAX_NOTES):
             self._notes[item.name] = item
         for output in tuple(self._outputs):
@@ -156,3 +190,26 @@ class Writer:
         self._outputs.remove(output)
         output.abandon()
         self._failed(output, error)
+
+
+class _Job:
+    """Something for the writer's thread to do, and what comes of it.
+
+    Args:
+        work: what is done.
+    """
+
+    def __init__(self, work: Callable[[], Any]) -> None:
+        self._work = work
+        self.future: Future[Any] = Future()
+        # It is done in any case: who waits may leave, but takes nothing back.
+        self.future.set_running_or_notify_cancel()
+
+    def run(self) -> None:
+        """Does it. Any other error than the disk's is a defect, which ends the thread; see `Writer._run`."""
+        try:
+            result = self._work()
+        except OSError as error:
+            self.future.set_exception(error)
+        else:
+            self.future.set_result(result)

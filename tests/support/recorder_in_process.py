@@ -81,6 +81,9 @@ class LatchedMessages:
     def take(self, sample: Sample) -> None:
         self._newest[sample.channel] = sample
 
+    def forget(self, channel: Channel) -> None:
+        self._newest.pop(channel, None)
+
     def samples(self) -> list[Sample]:
         return list(self._newest.values())
 

@@ -131,7 +131,7 @@ class RecordingStatus:
     room_bytes: int
     """May be written before something has to be deleted or recording stops."""
     room_s: int | None
-    """How long that lasts at the present rate; None while nothing is written."""
+    """How long it can record at the present rate, with what may be deleted; None while nothing is written."""
     ring_s: int
     """Seconds that the ring holds; 0 without a ring."""
     snapshots_pending: int

@@ -1,5 +1,6 @@
 """What the disk does to a recorder: full, damaged, strange, shared with another one."""
 
+import errno
 import os
 import resource
 import shutil
@@ -13,9 +14,11 @@ import pytest
 
 from common.errors import NotFoundError, PreconditionError, TooMuchError, UserError
 from recorder.lifecycle import State
-from recorder.requests import StartOptions
+from recorder.requests import SnapshotOptions, StartOptions
+from recorder.store.folder import replace_file
 from recorder.store.lock import folder_lock
 from recorder.store.manifest import Copy, CopyState, Kind, Manifest, RecordingState, StopReason
+from recorder.values import Gap, GapCause
 from tests.support.recorder_in_process import Running, Source, numbers, running_recorder
 
 MIB = 1024 * 1024
@@ -135,6 +138,69 @@ async def test_an_error_of_the_disk_ends_the_recording_and_it_records_again_by_i
         assert found == list(range(1, len(found) + 1))
         assert len(found) >= 100
         assert (await running.operations.start("3", StartOptions())).recording
+
+
+async def test_the_gap_of_a_failed_disk_covers_what_was_buffered(tmp_path: Path) -> None:
+    async with running_recorder(tmp_path) as running:
+        await running.operations.start("1", StartOptions())
+        source = Source(running.queue)
+        source.send(100)
+        await running.written(100)
+        with files_of_at_most(200_000):
+            handed_ns = time.time_ns()
+            source.send(100, size=20_000)
+            await running.until(lambda: running.readings.running is None)
+        cut = running.readings.newest
+        assert cut
+        (gap,) = [each for each in cut.gaps if each.cause is GapCause.DISK]
+        assert gap.began_ns <= handed_ns < gap.ended_ns
+
+
+async def test_a_snapshot_tells_when_the_ring_could_not_be_written(tmp_path: Path) -> None:
+    async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
+        await running.until(lambda: running.readings.writes)
+        source = Source(running.queue)
+        source.send(10)
+        made = await running.operations.snapshot("1", SnapshotOptions(pre_s=10, post_s=3), "someone")
+        assert made.recording
+        with files_of_at_most(100_000):
+            handed_ns = time.time_ns()
+            source.send(100, size=20_000)
+            await running.until(lambda: "the ring can't be written" in running.readings.last_error)
+        await running.until(lambda: not running.readings.snapshots_pending)
+        found = running.readings.get(made.recording.id)
+        (gap,) = [each for each in found.gaps if each.cause is GapCause.DISK]
+        assert gap.began_ns <= handed_ns < gap.ended_ns
+
+
+async def test_a_snapshot_over_a_restart_tells_of_it(tmp_path: Path) -> None:
+    ring = {"preset": "all"}
+    async with running_recorder(tmp_path, ring=ring) as running:
+        await running.until(lambda: running.readings.writes)
+        Source(running.queue).send(10)
+    async with running_recorder(tmp_path, ring=ring) as running:
+        await running.until(lambda: running.readings.writes)
+        Source(running.queue, sent=10).send(10)
+        made = await running.operations.snapshot("1", SnapshotOptions(pre_s=60, post_s=0), "someone")
+        await running.until(lambda: not running.readings.snapshots_pending)
+        assert made.recording
+        found = running.readings.get(made.recording.id)
+        assert numbers(running.readings, found) == list(range(1, 21))
+        (gap,) = found.gaps
+        first, second = (each for each in found.segments if each.messages)
+        assert gap == Gap("", GapCause.INTERRUPTED, first.last_ns or 0, second.first_ns or 0, None)
+
+
+async def test_a_snapshot_that_was_cut_off_lacks_the_rest_of_its_window(tmp_path: Path) -> None:
+    async with running_recorder(tmp_path) as running:
+        done = await recorded(running)
+    last_ns = done.segments[-1].last_ns or 0
+    until_ns = last_ns + 1_000_000_000
+    cut = {"state": RecordingState.RECORDING, "kind": Kind.SNAPSHOT, "window_ns": (0, until_ns)}
+    done.model_copy(update=cut).write(tmp_path / "recordings" / done.id)
+    async with running_recorder(tmp_path) as running:
+        found = running.readings.get(done.id)
+        assert found.gaps == (Gap("", GapCause.INTERRUPTED, last_ns, until_ns, None),)
 
 
 @pytest.mark.parametrize("harm", [Path.unlink, lambda path: path.write_bytes(b"")], ids=["gone", "empty"])
@@ -271,3 +337,220 @@ async def test_a_snapshot_cut_off_in_this_boot_does_not_grow_afterwards(tmp_path
         assert found.state is RecordingState.RECOVERED
         calendar_ms = found.ended_unix_ms - found.started_unix_ms
         assert running.readings.live(found).duration_ms == max(calendar_ms, 0)
+
+
+async def test_a_recording_can_be_deleted_on_a_disk_without_a_free_byte(small_disk: Path) -> None:
+    async with running_recorder(small_disk / "root") as running:
+        done = await recorded(running, MIB)
+        fill(small_disk, 0)
+        await running.operations.delete("1", done.id, done.sha256, force=False)
+        assert running.readings.recordings == []
+        assert not running.readings.folder_of(done).exists()
+
+
+async def test_a_start_on_a_full_disk_makes_whole_what_was_cut_off_and_then_room(
+    small_disk: Path,
+) -> None:
+    root = small_disk / "root"
+    old, cut = await cut_off(root)
+    fill(small_disk, 0)
+    async with running_recorder(root, boot_id="another") as running:
+        await running.until(lambda: running.readings.phase.state is State.IDLE)
+        found = running.readings.get(cut.id)
+        assert (found.state, found.messages) == (RecordingState.RECOVERED, 10)
+        assert running.readings.has(old.id), "what is cut off fits into the reserve"
+        assert (await running.operations.start("again", StartOptions())).recording
+        assert not running.readings.has(old.id)
+
+
+async def test_a_start_on_a_full_disk_without_a_reserve_deletes_as_ever(small_disk: Path) -> None:
+    root = small_disk / "root"
+    old, cut = await cut_off(root)
+    (root / "reserve").unlink()
+    fill(small_disk, 0)
+    async with running_recorder(root, boot_id="another") as running:
+        await running.until(lambda: running.readings.phase.state is State.IDLE)
+        assert running.readings.get(cut.id).state is RecordingState.RECOVERED
+        assert not running.readings.has(old.id)
+
+
+@pytest.mark.parametrize("deleted", [0, 1, 2])
+async def test_a_deletion_that_was_cut_off_is_gone_on_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, deleted: int
+) -> None:
+    async with running_recorder(tmp_path) as running:
+        done = await recorded(running)
+        unlink, left = Path.unlink, iter(range(deleted))
+
+        def cut(path: Path, missing_ok: bool = False) -> None:
+            if done.id in path.parts and next(left, None) is None:
+                raise OSError(errno.EIO, "as if the power were gone")
+            unlink(path, missing_ok=missing_ok)
+
+        with monkeypatch.context() as patched:
+            patched.setattr(Path, "unlink", cut)
+            with pytest.raises(OSError, match="as if"):
+                await running.operations.delete("1", done.id, b"", force=False)
+    async with running_recorder(tmp_path) as running:
+        assert running.readings.recordings == []
+        assert not running.readings.folder_of(done).exists()
+
+
+async def cut_off(root: Path) -> tuple[Manifest, Manifest]:
+    """Two recordings: one that has ended, and one as it is left when the power is cut."""
+    async with running_recorder(root) as running:
+        old = await recorded(running, 8 * MIB)
+        await running.operations.start("cut", StartOptions())
+        Source(running.queue).send(10)
+        await running.written(10)
+        cut = running.readings.running
+        assert cut
+        (part,) = (running.readings.folder_of(cut) / "data").glob("*.part")
+        content = part.read_bytes()
+    for file in part.parent.iterdir():
+        file.unlink()
+    part.write_bytes(content)
+    cut.write(part.parent.parent)
+    return old, cut
+
+
+async def test_a_file_that_the_disk_refuses_costs_no_other_recording(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, cut = await cut_off(tmp_path)
+
+    def broken(part: Path) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO), str(part))
+
+    with monkeypatch.context() as patched:
+        patched.setattr("recorder.store.salvage.recover", broken)
+        async with running_recorder(tmp_path, boot_id="another") as running:
+            assert running.readings.phase.state is State.IDLE
+            found = running.readings.get(cut.id)
+            assert (found.state, found.messages) == (RecordingState.RECOVERED, 0)
+            assert GapCause.DISK in {gap.cause for gap in found.gaps}
+            assert (await recorded(running, 3000)).messages == 10
+    async with running_recorder(tmp_path, boot_id="another") as running:
+        assert running.readings.get(cut.id).messages == 10, "the disk reads it again"
+
+
+async def test_a_recording_that_the_disk_refuses_to_complete_is_set_aside(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old, cut = await cut_off(tmp_path)
+
+    def forbidden(path: Path, content: bytes) -> None:
+        if cut.id in path.parts:
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+        replace_file(path, content)
+
+    monkeypatch.setattr("recorder.store.salvage.replace_file", forbidden)
+    monkeypatch.setattr("recorder.store.manifest.replace_file", forbidden)
+    async with running_recorder(tmp_path, boot_id="another") as running:
+        assert running.readings.phase.state is State.IDLE
+        assert running.readings.get(cut.id).state is RecordingState.FAULTED
+        assert f"recording {cut.id} can't be completed: Permission denied" in running.readings.last_error
+        assert running.readings.get(old.id).state is RecordingState.COMPLETE
+        assert (await recorded(running, 3000)).messages == 10
+        await running.operations.delete("1", cut.id, b"", force=False)
+        assert running.readings.last_error == ""
+
+
+async def test_an_unfinished_file_whose_final_name_is_taken_is_kept_aside(tmp_path: Path) -> None:
+    async with running_recorder(tmp_path) as running:
+        done = await recorded(running)
+    data = tmp_path / "recordings" / done.id / "data"
+    shutil.copy(data / "000000.mcap", data / "000000.mcap.part")
+    (data / "000000.mcap.damaged").write_text("an earlier one", encoding="utf-8")
+    async with running_recorder(tmp_path) as running:
+        assert running.readings.phase.state is State.IDLE
+        found = running.readings.get(done.id)
+        assert (found.messages, found.segments) == (10, done.segments)
+        assert GapCause.DISK in {gap.cause for gap in found.gaps}
+        assert (data / "000000.mcap.damaged").read_text(encoding="utf-8") == "an earlier one"
+        assert (data / "000000.mcap.damaged.1").exists()
+        await running.operations.delete("1", done.id, b"", force=False)
+    assert not data.exists()
+
+
+async def test_the_number_of_a_damaged_file_is_not_used_again(tmp_path: Path) -> None:
+    _, cut = await cut_off(tmp_path)
+    data = tmp_path / "recordings" / cut.id / "data"
+    (data / "000000.mcap").write_bytes(b"damaged")
+    (data / "000000.mcap.part").unlink()
+    async with running_recorder(tmp_path) as running:
+        await running.until(lambda: running.readings.phase.state is State.RECORDING)
+        Source(running.queue).send(10)
+        done = (await running.operations.stop("stop", "")).recording
+        assert done
+        assert [segment.name for segment in done.segments] == ["data/000001.mcap"]
+    assert (data / "000000.mcap").read_bytes() == b"damaged"
+
+
+async def test_the_ring_alone_deletes_no_recording_for_what_others_have_written(small_disk: Path) -> None:
+    """A program that fills the disk with its log would cost the robot all recordings, and gain nothing."""
+    room = {"min_free_bytes": 8 * MIB}
+    async with running_recorder(small_disk / "root", room=room, ring={"preset": "all"}) as running:
+        done = await recorded(running, MIB)
+        made = await running.operations.snapshot("1", SnapshotOptions(pre_s=10, post_s=600), "someone")
+        assert made.recording
+        ballast = fill(small_disk, 6 * MIB)
+        # It ends with what it has.
+        await running.until(lambda: not running.readings.snapshots_pending)
+        snapshot = running.readings.get(made.recording.id)
+        assert (snapshot.stop_reason, snapshot.messages) == (StopReason.DISK, 10)
+        assert running.readings.has(done.id)
+        ballast.unlink()
+        ballast = fill(small_disk, 0)
+        Source(running.queue).send(10, size=MIB)
+        await running.until(lambda: "the ring can't be written" in running.readings.last_error)
+        assert running.readings.has(done.id)
+        assert running.readings.phase.state is State.IDLE
+        # Also by itself when there is room again.
+        ballast.unlink()
+        await running.until(lambda: running.readings.writes)
+        assert running.readings.last_error == ""
+
+
+async def test_a_copy_that_shares_its_blocks_is_not_deleted_in_vain(small_disk: Path) -> None:
+    room = {"min_free_bytes": 8 * MIB}
+    async with running_recorder(small_disk / "root", room=room) as running:
+        shared, other = await recorded(running, MIB), await recorded(running, MIB + 1)
+        for file in (running.readings.folder_of(shared) / "data").iterdir():
+            (small_disk / file.name).hardlink_to(file)
+        fill(small_disk, 11 * MIB + MIB // 2)
+        await running.operations.start("a", StartOptions())
+        assert running.readings.has(shared.id)
+        assert not running.readings.has(other.id)
+
+
+async def test_the_room_that_is_told_has_what_older_recordings_make(small_disk: Path) -> None:
+    """A robot that has recorded for weeks is always at its limit, and can record as long as ever."""
+    async with running_recorder(small_disk / "root") as running:
+        one, pinned = await recorded(running, 8 * MIB), await recorded(running, 4 * MIB)
+        await running.operations.pin("pin", pinned.id, pinned=True)
+        ballast = fill(small_disk, 5 * MIB)
+        await running.operations.start("1", StartOptions())
+        source = Source(running.queue)
+
+        def told() -> float:
+            source.send(size=1000)
+            return running.readings.room_s or 0.0
+
+        await running.until(told)
+        told_bytes = (running.readings.room_s or 0.0) * running.readings.bytes_per_s
+        assert one.size + 4 * MIB < told_bytes < one.size + 6 * MIB
+        await running.operations.stop("2", "")
+        assert not running.readings.disk_short
+        ballast.unlink()
+        fill(small_disk, 0)
+        await running.operations.pin("pin too", one.id, pinned=True)
+        await running.until(lambda: running.readings.disk_short)
+
+
+async def test_a_recording_that_was_deleted_by_hand_can_be_deleted(tmp_path: Path) -> None:
+    async with running_recorder(tmp_path) as running:
+        done = await recorded(running)
+        shutil.rmtree(running.readings.folder_of(done))
+        await running.operations.delete("1", done.id, b"", force=False)
+        assert running.readings.recordings == []

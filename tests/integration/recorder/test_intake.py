@@ -20,7 +20,7 @@ from std_msgs.msg import Int32, String
 from recorder.intake.intake import intake
 from recorder.mcap.rosbag2 import FILE_NAME, metadata
 from recorder.mcap.writer import SegmentWriter
-from recorder.values import Sample
+from recorder.values import Ended, Loss, Sample
 from tests.integration.recorder.conftest import Everything, Taken
 from tests.support.talker import Talker, talking
 from tests.support.waiting import wait_until
@@ -86,6 +86,16 @@ def test_latched_messages_reach_an_intake_that_comes_late(talker: Talker) -> Non
     (sample,) = [each for each in items if isinstance(each, Sample)]
     assert sample.channel.latched
     assert b"second" in sample.data
+
+
+def test_a_latched_topic_that_is_no_longer_taken_has_ended(talker: Talker, taken: Taken) -> None:
+    latched = {"durability": DurabilityPolicy.TRANSIENT_LOCAL, "depth": 1}
+    talker.publisher("/robot_description", String, **latched).publish(String(data="first"))
+    wait_until(lambda: taken.samples("/robot_description"), "the latched message")
+    taken.intake.want(frozenset({"nothing"}))
+    wait_until(lambda: any(isinstance(each, Ended) for each in list(taken.items)), "the end")
+    (ended,) = [each for each in taken.items if isinstance(each, Ended)]
+    assert ended.channel is taken.samples("/robot_description")[0].channel
 
 
 def test_qos_follows_publishers_that_join_later(talker: Talker, taken: Taken) -> None:
@@ -206,6 +216,66 @@ def test_what_a_stalled_intake_loses_is_counted(
     assert stalled.is_set()
     assert received + lost == 3000
     assert lost > 100
+
+
+def stall(taken: Taken, publisher: Any, message: Any) -> None:
+    """Holds the intake up while more comes than its queue holds; its next pass takes what is left of it."""
+    held, goes_on = threading.Event(), threading.Event()
+    put = taken.intake._put  # the thread is held where it hands over
+
+    def hold(items: Any) -> None:
+        taken.intake._put = put
+        held.set()
+        goes_on.wait(10)
+        put(items)
+
+    taken.intake._put = hold
+    publisher.publish(message)
+    assert held.wait(10)
+    for _ in range(1000):
+        publisher.publish(message)
+    goes_on.set()
+
+
+def test_losses_are_told_when_the_intake_has_caught_up(
+    talker: Talker, taken: Taken, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And not only when the graph is examined the next time: a recording has ended by then."""
+    publisher = talker.publisher("/value", Int32)
+    subscribed(publisher)
+    publisher.publish(Int32(data=-1))
+    wait_until(lambda: taken.samples("/value"), "a message")
+    monkeypatch.setattr("recorder.intake.intake.EXAMINE_EVERY_S", 1000.0)
+    ticket = taken.intake.catch_up()
+    wait_until(lambda: taken.intake.caught_up >= ticket, "the graph is not examined again by itself")
+    stall(taken, publisher, Int32())
+    ticket = taken.intake.catch_up()
+    wait_until(lambda: taken.intake.caught_up >= ticket, "the intake has caught up")
+    assert taken.lost("/value") > 0
+    assert len(taken.samples("/value")) + taken.lost("/value") == 1002
+
+
+def test_how_many_are_lost_is_unknown_while_the_publishers_are(talker: Talker, taken: Taken) -> None:
+    command = [sys.executable, "-m", "tests.support.undecodable_peer", "/theirs"]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT
+    ) as peer:
+        assert peer.stdout
+        assert "ready" in peer.stdout.readline()
+        publisher = talker.publisher("/theirs", Odometry)
+        subscribed(publisher)
+        wait_until(lambda: taken.samples("/theirs"), "a message of the peer")
+        stall(taken, publisher, Odometry())
+
+        def told() -> list[Loss]:
+            losses = [each for each in list(taken.items) if isinstance(each, Loss)]
+            return [each for each in losses if each.channel and each.channel.topic == "/theirs"]
+
+        wait_until(told, "a loss")
+        assert {each.messages for each in told()} == {None}
+        assert peer.stdin
+        peer.stdin.close()
+        peer.wait(10)
 
 
 def taken_and_lost(taken: Taken, hz: int, size: int, count: int) -> tuple[int, int]:

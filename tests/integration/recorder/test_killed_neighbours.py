@@ -96,3 +96,16 @@ def test_a_killed_preview_costs_a_recording_its_frames_alone_and_the_file_says_s
         assert len(video) == made.video_frames
         stamps = [(each.timestamp.sec, each.timestamp.nanosec) for each in video]
         assert stamps == sorted(set(stamps))
+
+
+@pytest.mark.usefixtures("ros_domain")
+def test_a_preview_that_never_came_is_a_gap_of_the_whole_recording(tmp_path: Path) -> None:
+    with recorder_program(tmp_path, video={"socket": str(tmp_path / "tap.sock")}) as recorder:
+        start = pb.StartRecordingRequest(request_id="1", with_video=True)
+        recording_id = recorder.call("StartRecording", start).recording.id
+        recorder.call("StopRecording", pb.StopRecordingRequest(request_id="2"))
+        made = recorder.recording(recording_id)
+        assert (made.state, made.video_frames) == (pb.RECORDING_STATE_COMPLETE, 0)
+        (gap,) = made.gaps
+        assert gap.cause == pb.RECORDING_GAP_CAUSE_VIDEO
+        assert made.started_unix_ms - 100 <= gap.began_unix_ms <= gap.ended_unix_ms <= made.ended_unix_ms

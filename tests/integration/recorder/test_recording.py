@@ -1,16 +1,20 @@
 """A recording from start to stop, on a real disk, with messages of the test's own."""
 
+import json
+import shutil
 import threading
 import time
 from pathlib import Path
 
 import pytest
+import yaml
 from rosbags.rosbag2 import Reader
 
 from common.errors import InvalidRequestError, NotFoundError, PreconditionError
 from recorder.lifecycle import State
 from recorder.requests import SnapshotOptions, StartOptions
 from recorder.store.manifest import Kind, RecordingState, StopReason
+from recorder.values import Ended, GapCause, Loss
 from recorder.writing.output import Output
 from tests.support.recorder_in_process import Source, channel, numbers, running_recorder
 
@@ -58,6 +62,19 @@ async def test_requests_repeated_change_nothing_even_after_a_restart(tmp_path: P
         assert running.readings.phase.state is State.IDLE
 
 
+async def test_a_repeated_request_is_known_after_the_clock_was_set_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with running_recorder(tmp_path) as running:
+        first = await running.operations.start("1", StartOptions())
+        now = time.time
+        monkeypatch.setattr(time, "time", lambda: now() - 3600)
+        again = await running.operations.start("1", StartOptions())
+        assert first.recording
+        assert again.recording
+        assert again.recording.id == first.recording.id
+
+
 async def test_limits_end_a_recording(tmp_path: Path) -> None:
     async with running_recorder(tmp_path) as running:
         await running.operations.start("1", StartOptions(max_duration_s=1))
@@ -80,6 +97,21 @@ async def test_a_long_recording_is_cut_into_segments_without_a_loss(tmp_path: Pa
         assert numbers(running.readings, done) == list(range(1, 61))
         # At the head of each segment.
         assert numbers(running.readings, done, "/tf_static") == [1] * len(done.segments)
+
+
+async def test_what_has_ended_is_not_repeated_at_the_head_of_a_segment(tmp_path: Path) -> None:
+    async with running_recorder(tmp_path) as running:
+        ended, lasting = (
+            Source(running.queue, channel(each, latched=True)) for each in ("/map", "/tf_static")
+        )
+        ended.send()
+        lasting.send()
+        running.queue.put([Ended(ended.of)])
+        await running.operations.start("1", StartOptions())
+        done = (await running.operations.stop("2", "")).recording
+        assert done
+        assert numbers(running.readings, done, "/tf_static") == [1]
+        assert numbers(running.readings, done, "/map") == []
 
 
 async def test_a_clock_that_steps_begins_a_segment(tmp_path: Path) -> None:
@@ -169,3 +201,28 @@ async def test_deleting_needs_a_reason_that_is_good_enough(tmp_path: Path) -> No
         assert (await running.operations.delete("6", done.id, done.sha256, force=True)).message
         with pytest.raises(NotFoundError):
             await running.operations.delete("7", done.id, b"", force=False)
+
+
+async def test_a_copy_tells_what_the_manifest_knows(tmp_path: Path) -> None:
+    """The files of a recording are copied, its manifest is not."""
+    options = StartOptions(label="lap 1", notes="wet: floor\n- and dark")
+    async with running_recorder(tmp_path) as running:
+        await running.operations.start("1", options)
+        source = Source(running.queue)
+        source.send()
+        running.queue.put([Loss(source.of, GapCause.MIDDLEWARE, 5, 7, 3)])
+        done = (await running.operations.stop("2", "")).recording
+        assert done
+        copied = tmp_path / "copy"
+        for file in done.files:
+            (copied / file.name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(running.readings.folder_of(done) / file.name, copied / file.name)
+    with Reader(copied / "data") as bag:
+        assert bag.message_count == 1
+    content = yaml.safe_load((copied / "data" / "metadata.yaml").read_text(encoding="utf-8"))
+    about = content["rosbag2_bagfile_information"]["custom_data"]
+    assert (about["id"], about["label"], about["notes"]) == (done.id, options.label, options.notes)
+    assert (about["state"], about["stop_reason"], about["preset"]) == ("complete", "requested", "all")
+    gap = {"topic": "/odom", "cause": "middleware", "began_ns": "5", "ended_ns": "7", "messages": "3"}
+    assert json.loads(about["gaps"]) == [gap]
+    assert all(isinstance(text, str) for text in about.values()), "rosbag2 reads nothing else"

@@ -14,7 +14,7 @@ from recorder.requests import StartOptions
 from recorder.store.folder import SEGMENT
 from recorder.store.lock import folder_lock
 from recorder.store.manifest import Manifest, RecordingState, StopReason
-from tests.support.recorder_in_process import Source, running_recorder
+from tests.support.recorder_in_process import Source, numbers, running_recorder
 
 
 async def cut_off(root: Path) -> Path:
@@ -57,6 +57,51 @@ async def test_one_file_is_enough(tmp_path: Path) -> None:
     summary = summarise(Path(found.file))
     assert summary
     assert summary.messages == found.messages > 0
+
+
+@pytest.mark.parametrize(
+    "named", [".", "root", "root/recordings", "root/recordings/{id}", "root/recordings/{id}/data", "{part}"]
+)
+async def test_what_a_recorder_writes_is_refused_whatever_is_named(tmp_path: Path, named: str) -> None:
+    root = tmp_path / "root"
+    with folder_lock(root):
+        async with running_recorder(root) as running:
+            await running.operations.start("1", StartOptions())
+            Source(running.queue).send(50)
+            await running.written(50)
+            (part,) = root.rglob("*.part")
+            path = tmp_path / named.format(id=part.parent.parent.name, part=part)
+            with pytest.raises(UserError, match="another recorder"):
+                recover_below(path)
+            done = (await running.operations.stop("2", "")).recording
+            assert done
+            assert numbers(running.readings, done) == list(range(1, 51))
+
+
+def test_a_ring_of_its_own_is_refused_while_it_is_written(tmp_path: Path) -> None:
+    with folder_lock(tmp_path):
+        (tmp_path / "00000000.mcap.part").touch()
+        with pytest.raises(UserError, match="another recorder"):
+            recover_below(tmp_path)
+
+
+async def test_a_damaged_file_is_kept(tmp_path: Path) -> None:
+    folder = await cut_off(tmp_path)
+    (part,) = (folder / "data").iterdir()
+    content = part.read_bytes()[:200]
+    part.write_bytes(content)
+    printed = CliRunner().invoke(app, ["recover", str(tmp_path)])
+    assert printed.exit_code == 0
+    assert "its damage leaves no message; it is kept" in printed.output
+    assert (folder / "data" / "000000.mcap.damaged").read_bytes() == content
+
+
+def test_a_final_file_is_refused(tmp_path: Path) -> None:
+    final = tmp_path / "000000.mcap"
+    final.write_bytes(b"final")
+    with pytest.raises(UserError, match="not unfinished"):
+        recover_below(final)
+    assert final.read_bytes() == b"final"
 
 
 def test_what_is_in_use_or_missing_is_refused(tmp_path: Path) -> None:

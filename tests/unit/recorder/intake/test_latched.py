@@ -68,3 +68,20 @@ def test_bytes_are_bounded_but_each_channel_keeps_its_newest(monkeypatch: pytest
 
 def test_without_numbers_the_only_one_is_replaced() -> None:
     assert kept(sample(0, "a"), sample(0, "b")) == [sample(0, "b")]
+
+
+def test_what_is_forgotten_takes_no_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(latched, "MAX_BYTES", 3000)
+    cache = LatchedCache()
+    tf = [sample(1, "a" * 900), sample(1, "b" * 900)]
+    for each in (sample(1, "x" * 900, MAP), *tf):
+        cache.take(each)
+    cache.forget(MAP)
+    cache.forget(MAP)
+    more = sample(1, "c" * 900)
+    cache.take(more)
+    assert list(cache.samples()) == [*tf, more]
+
+
+def test_lines_of_the_log_are_no_state_that_holds() -> None:
+    assert kept(sample(1, "started", replace(TF, topic="/rosout"))) == []

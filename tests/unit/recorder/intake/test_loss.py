@@ -7,12 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from recorder.intake import loss
 from recorder.intake.loss import LossCounter
 
 
 def lost(counter: LossCounter, publishers: frozenset[Hashable] | None) -> int:
     found = counter.collect(publishers)
-    return found.messages if found else 0
+    return (found.messages or 0) if found else 0
 
 
 ONE: frozenset[Hashable] = frozenset({"a"})
@@ -83,6 +84,36 @@ def test_where_messages_have_no_numbers_nothing_is_counted(counter: LossCounter)
 def test_without_knowledge_of_the_publishers_nothing_is_counted(counter: LossCounter) -> None:
     take(counter, [1, 5])
     assert lost(counter, None) == 0
+
+
+def test_without_knowledge_of_the_publishers_it_is_unknown_how_many_are_missing(counter: LossCounter) -> None:
+    take(counter, [1, 2, 5])
+    found = counter.collect(None)
+    assert found
+    assert (found.messages, found.began_ns, found.ended_ns) == (None, 20, 50)
+    take(counter, [6, 7])
+    assert counter.collect(None) is None
+    take(counter, [9])
+    assert lost(counter, ONE) == 1, "the publishers that were known before are there"
+
+
+def test_what_is_missing_while_a_publisher_joins_or_leaves_is_counted(counter: LossCounter) -> None:
+    take(counter, [1, 2, 700, 4, 702])
+    assert lost(counter, frozenset({"a", "b"})) == 2
+    take(counter, [5, 703, 7, 8])
+    assert lost(counter, ONE) == 1
+    take(counter, [9, 11])
+    assert lost(counter, ONE) == 1
+
+
+def test_more_than_can_be_gone_through_again_is_unknown(
+    counter: LossCounter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(loss, "_MAX_RECENT", 10)
+    take(counter, [*range(1, 20), 21])
+    found = counter.collect(frozenset({"b"}))
+    assert found
+    assert found.messages is None
 
 
 def test_memory_is_bounded_and_the_count_exact(counter: LossCounter) -> None:

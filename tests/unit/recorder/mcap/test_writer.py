@@ -132,3 +132,18 @@ def test_a_full_disk_is_an_oserror_and_leaves_what_was_flushed(
     recovered = recover(tmp_path / "0.mcap.part")
     assert recovered
     assert recovered.messages == 1
+
+
+def test_a_file_that_can_not_be_begun_leaves_nothing_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_handle: int, _data: Any) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "write", full)
+        with pytest.raises(OSError, match="No space left"):
+            SegmentWriter(tmp_path / "0.mcap.part")
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
+    assert not list(tmp_path.iterdir())

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from recorder.store.retention import Keepable, in_order
+from recorder.store.retention import Keepable, Stored, frees, in_order
 
 keepables = st.lists(
     st.builds(
@@ -48,3 +48,34 @@ def test_the_ring_first_then_copies_then_the_oldest(candidates: list[Keepable]) 
     for group in range(3):
         ages = [each.ended_ns for each, its in zip(order, groups, strict=True) if its == group]
         assert ages == sorted(ages)
+
+
+def stored(number: int, links: int = 1, size: int = 10) -> Stored:
+    return Stored((1, number), links, size)
+
+
+def recording(name: str, *files: Stored, ordinal: int = 0, ended_ns: int = 0) -> Keepable:
+    return Keepable(name, ended_ns, ordinal=ordinal, files=files)
+
+
+def freed(*order: Keepable) -> list[tuple[str, int]]:
+    return [(each.name, size) for each, size in frees(order)]
+
+
+def test_a_file_is_freed_with_its_last_name() -> None:
+    shared = stored(1, links=2)
+    assert freed(recording("a", shared, stored(2)), recording("b", shared)) == [("a", 10), ("b", 10)]
+
+
+def test_what_shares_everything_with_something_that_stays_is_left_out() -> None:
+    backed_up = stored(1, links=2)
+    assert freed(recording("a", backed_up), recording("b", stored(2)), recording("c")) == [("b", 10)]
+    assert freed(recording("a", backed_up, stored(3))) == [("a", 10)]
+
+
+def test_the_order_of_making_counts_and_not_the_calendar() -> None:
+    """A robot without a clock of its own begins in 1970 after each start."""
+    newest = recording("newest", ordinal=2, ended_ns=5)
+    before = recording("before", ordinal=1, ended_ns=2_000_000_000)
+    of_a_former_release = recording("former", ended_ns=1_900_000_000)
+    assert in_order([newest, before, of_a_former_release]) == [of_a_former_release, before, newest]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from recorder.store.room import RESERVE_BYTES, Disk, Limits, Reserve, used_bytes
+from recorder.store.room import RESERVE_BYTES, Disk, Limits, Reserve, RoomToCome, stored, used_bytes
 
 GIB = 1024**3
 
@@ -42,3 +42,26 @@ def test_the_reserve_is_taken_and_given_back(tmp_path: Path) -> None:
     reserve.give()
     reserve.give()
     assert used_bytes([tmp_path]) == 0
+
+
+def test_what_was_deleted_counts_as_room_until_the_disk_shows_it() -> None:
+    to_come = RoomToCome()
+    to_come.expect(100, now_s=0.0)
+    to_come.came(-5)  # what is written meanwhile
+    to_come.came(60)
+    assert to_come.bytes(1.0) == 40
+    to_come.expect(10, now_s=20.0)
+    assert to_come.bytes(49.0) == 50
+    assert to_come.bytes(50.0) == 0
+    to_come.expect(1, now_s=60.0)
+    assert to_come.bytes(60.0) == 1
+
+
+def test_files_are_told_with_what_they_take_and_share(tmp_path: Path) -> None:
+    one, other = tmp_path / "one", tmp_path / "other"
+    one.write_bytes(bytes(5000))
+    other.hardlink_to(one)
+    found = stored([one, other, tmp_path / "missing"])
+    assert [each.links for each in found] == [2, 2]
+    assert found[0] == found[1]
+    assert found[0].bytes >= 5000

@@ -38,3 +38,17 @@ def test_a_damaged_file_counts_as_empty(tmp_path: Path, content: bytes) -> None:
     state = StateFile(tmp_path)
     state.load()
     assert state.answered("StartRecording", "1", 0.0) is None
+
+
+def test_an_answer_of_an_earlier_boot_is_given_while_this_boot_is_young(tmp_path: Path) -> None:
+    """Whatever the calendar says: a robot may have no clock of its own."""
+    before = StateFile(tmp_path, "first")
+    made = answer(1_800_000_000.0).model_copy(update={"boot_id": "first"})
+    before.remember("1", made)
+    before.write()
+    after = StateFile(tmp_path, "second")
+    after.load()
+    assert after.answered("StartRecording", "1", REMEMBERED_S - 1) == made
+    assert after.answered("StartRecording", "1", REMEMBERED_S) is None
+    after.remember("2", answer(REMEMBERED_S).model_copy(update={"boot_id": "second"}))
+    assert after.answered("StartRecording", "1", 0.0) is None, "it is forgotten"

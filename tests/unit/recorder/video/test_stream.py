@@ -24,7 +24,7 @@ class Run:
     """A stream, and the clock, which goes on with each record."""
 
     def __init__(self, *, informed: bool = True) -> None:
-        self.stream = Stream(CHANNEL)
+        self.stream = Stream(CHANNEL, NOW)
         self.now = NOW
         if informed:
             self.info(INFO)
@@ -120,6 +120,34 @@ def test_a_preview_that_was_never_there_is_a_loss_to_the_end() -> None:
     (loss,) = losses(run.stream.end(later))
     assert loss.ended_ns - loss.began_ns == 9 * S
     assert Run().stream.end(later) == []
+
+
+def test_a_loss_so_far_is_told_and_lasts_on() -> None:
+    run = Run()
+    (last,) = samples(run.unit())
+    assert run.stream.loss_so_far(run.now) == []
+    run.stream.disconnected(run.now)
+    stopped, ended = Now(0, last.publish_time_ns + 3 * S), Now(0, last.publish_time_ns + 5 * S)
+    (first,) = losses(run.stream.loss_so_far(stopped))
+    (rest,) = losses(run.stream.end(ended))
+    assert (first.began_ns, first.ended_ns) == (last.publish_time_ns, stopped.calendar_ns)
+    assert (rest.began_ns, rest.ended_ns) == (stopped.calendar_ns, ended.calendar_ns)
+
+
+@pytest.mark.parametrize("informed", [False, True])
+def test_a_preview_that_sent_no_frame_so_far_is_a_loss_from_the_beginning(informed: bool) -> None:
+    run = Run(informed=informed)
+    later = Now(NOW.monotonic_ns + 9 * S, NOW.calendar_ns + 9 * S)
+    (loss,) = losses(run.stream.loss_so_far(later))
+    assert (loss.began_ns, loss.ended_ns) == (NOW.calendar_ns, later.calendar_ns)
+
+
+def test_a_preview_whose_frames_do_not_flow_is_a_loss_since_the_last_one() -> None:
+    run = Run()
+    (last,) = samples(run.unit())
+    run.info({"state": "faulted", "error": "no camera"})
+    (loss,) = losses(run.stream.loss_so_far(run.now))
+    assert (loss.began_ns, loss.ended_ns) == (last.publish_time_ns, run.now.calendar_ns)
 
 
 def test_another_codec_begins_with_a_key_frame() -> None:

@@ -6,7 +6,7 @@ import time
 from hypothesis import given
 from hypothesis import strategies as st
 
-from recorder.values import Channel, GapCause, Item, Loss, Note, Sample
+from recorder.values import Channel, Ended, GapCause, Item, Loss, Note, Sample
 from recorder.writing.queue import SampleQueue
 
 ODOM, SCAN = (
@@ -66,3 +66,9 @@ def test_a_wake_ends_the_wait() -> None:
     assert queue.take(10) == []
     assert time.monotonic() - began_s < 5
     timer.join()
+
+
+def test_that_a_topic_has_ended_is_never_dropped() -> None:
+    queue = SampleQueue(1)
+    queue.put([sample(), sample(), Ended(ODOM)])
+    assert Ended(ODOM) in queue.take(0.0)

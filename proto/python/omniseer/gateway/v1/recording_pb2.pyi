@@ -566,7 +566,9 @@ class RecordingStatus(_message.Message):
     room_bytes: _builtins.int
     """Bytes that may still be written before something has to be deleted or recording stops."""
     room_s: _builtins.int
-    """How long that lasts at the present rate, in s. Unset while nothing is written."""
+    """How long recording can go on at the present rate, in s, with the room that deletable recordings make. Unset
+    while nothing is written.
+    """
     ring_s: _builtins.int
     """Seconds that the ring holds at present. 0 without a ring."""
     snapshots_pending: _builtins.int

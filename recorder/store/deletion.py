@@ -1,0 +1,58 @@
+"""Deleting a recording in two steps, so that a crash in between leaves none that is there by half.
+
+It needs no room: a full disk is what it is for. That a deletion has begun is told by the manifest's new name.
+"""
+
+import re
+from pathlib import Path
+from typing import Final
+
+from common.private_files import sync_directory
+from recorder.mcap.records import PART
+from recorder.store.folder import DAMAGED, DAMAGED_MANIFEST, DATA, MANIFEST, METADATA, SEGMENT_FILE
+
+_DELETING: Final = f"{MANIFEST}.deleting"
+_OURS: Final = re.compile(
+    rf"{SEGMENT_FILE.pattern}({re.escape(PART)}|{re.escape(DAMAGED)}(\.\d+)?)?|{re.escape(Path(METADATA).name)}"
+)
+"""Names of what the recorder makes in the folder of the segments."""
+
+
+def begin(folder: Path) -> None:
+    """Makes sure that the deletion of a recording goes on at the next start if it is cut off.
+
+    Raises:
+        OSError: the disk fails; nothing has been deleted.
+    """
+    try:
+        (folder / MANIFEST).rename(folder / _DELETING)
+    except FileNotFoundError:  # The disk has never taken one.
+        (folder / _DELETING).touch()
+    sync_directory(folder)
+
+
+def has_begun(folder: Path) -> bool:
+    """Returns whether the deletion of a recording was cut off."""
+    return (folder / _DELETING).exists()
+
+
+def complete(folder: Path) -> None:
+    """Deletes what is the recorder's own in a recording's folder, and the folder if nothing else is in it.
+
+    Raises:
+        OSError: the disk fails; it can be tried again.
+    """
+    data = folder / DATA
+    if data.is_dir() and not data.is_symlink():
+        for path in [each for each in data.iterdir() if _OURS.fullmatch(each.name)]:
+            path.unlink(missing_ok=True)
+        _remove_if_empty(data)
+    # The mark last.
+    for name in (DAMAGED_MANIFEST, MANIFEST, _DELETING):
+        (folder / name).unlink(missing_ok=True)
+    _remove_if_empty(folder)
+
+
+def _remove_if_empty(directory: Path) -> None:
+    if not any(directory.iterdir()):
+        directory.rmdir()
