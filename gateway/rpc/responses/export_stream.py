@@ -8,6 +8,7 @@ from typing import Final
 from common.errors import TooMuchError
 from common.reasons import Reason
 from gateway.links.recorder.calls import RecorderCalls
+from gateway.rpc.mapping.export import message_parts
 
 MAX_OF_A_CALLER: Final = 4
 MAX_OF_ALL: Final = 8
@@ -56,7 +57,8 @@ class ExportStream:
         self._open[caller] += 1
         try:
             async with aclosing(calls.export(request, caller)) as responses:
-                async for response in responses:
+                async for each in responses:
+                    response = each if isinstance(each, bytes) else b"".join(message_parts(each))
                     self.sent_bytes += len(response)
                     yield response
         finally:
