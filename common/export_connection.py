@@ -4,18 +4,17 @@ Two programs that pass the same bytes on cost twice the processor of one. So the
 read, and the gateway reads it:
 
 1. The gateway calls ExportRecording with the metadata KEY_HEADER, random bytes.
-2. A recorder that can do this, and may send as fast as it can, answers with the initial metadata
-   OPENED_HEADER, and the header of the export.
+2. A recorder that can do this answers with the initial metadata OPENED_HEADER, and the header of the export.
 3. The gateway connects to `socket_beside` of the recorder's socket, and sends the key.
-4. The recorder sends RANGE, from where to where to read, with the file's descriptor, which is open for
-   reading alone (SCM_RIGHTS, unix(7)).
+4. The recorder sends ORDER, from where to where and how fast to read, with the file's descriptor, which is
+   open for reading alone (SCM_RIGHTS, unix(7)).
 5. The gateway answers TAKEN, and reads. It withholds the last block, and disconnects.
 6. The call ends: with OK when the whole file has been verified, or at any time with the reason why no more of
    it may be read. The gateway closes the file.
 
 The call carries the chunks instead where the gateway does not connect within CONNECT_WITHIN_S, as with a
-recorder or a gateway that knows none of this, or where a limit of bytes a second applies, which the recorder
-keeps. The gateway need not know why. Pure.
+recorder or a gateway that knows none of this, or where a limit of all exports together applies, which the
+recorder keeps. The gateway need not know why. Pure.
 """
 
 import struct
@@ -29,8 +28,8 @@ OPENED_HEADER: Final = "x-export-file"
 KEY_BYTES: Final = 16
 CONNECT_WITHIN_S: Final = 2.0
 """From the call to TAKEN."""
-RANGE: Final = struct.Struct(">QQ")
-"""The first byte, and the one after the last."""
+ORDER: Final = struct.Struct(">QQQ")
+"""The first byte, the one after the last, and how many may leave in a second; 0 for no limit."""
 TAKEN: Final = b"\1"
 
 _SUFFIX: Final = ".exports"

@@ -23,7 +23,7 @@ from typing import Final
 from common import bind
 from common.deadline import within
 from common.errors import UserError
-from common.export_connection import CONNECT_WITHIN_S, KEY_BYTES, RANGE, TAKEN, socket_beside
+from common.export_connection import CONNECT_WITHIN_S, KEY_BYTES, ORDER, TAKEN, socket_beside
 from common.open_file import OpenFile
 from common.tasks import cancel
 
@@ -45,11 +45,12 @@ class ExportConnection:
     def __init__(self, connected: socket.socket) -> None:
         self._socket = connected
 
-    async def hand_over(self, file: OpenFile, offset: int) -> bool:
+    async def hand_over(self, file: OpenFile, offset: int, max_bytes_per_s: int) -> bool:
         """Hands a file over, to be read from an offset on; returns whether the gateway has taken it."""
         try:
             # Nothing has been sent before: there is room for it.
-            socket.send_fds(self._socket, [RANGE.pack(offset, file.size)], [file.descriptor])
+            order = ORDER.pack(offset, file.size, max_bytes_per_s)
+            socket.send_fds(self._socket, [order], [file.descriptor])
             return await _received(self._socket, len(TAKEN)) == TAKEN
         except OSError as error:
             _log.info("an export's file can't be handed over: %s", error.strerror or error)

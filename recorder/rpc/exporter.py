@@ -29,6 +29,7 @@ from common.errors import (
 from common.export_connection import CONNECT_WITHIN_S, KEY_HEADER, OPENED_HEADER, key_of
 from common.open_file import ClosedError, UnreadableError
 from common.pace import Pace
+from common.paced_chunks import paced_chunks
 from common.reasons import Reason
 from common.tasks import first_to_end
 from omniseer.gateway.v1 import recording_pb2 as pb
@@ -36,7 +37,7 @@ from recorder.readings import Readings
 from recorder.rpc import mapping
 from recorder.rpc.export_connections import ExportConnection, ExportConnections
 from recorder.store.bundle_reader import BundleReader
-from recorder.store.export import Content, Export, chunks, export
+from recorder.store.export import Content, Export, export
 from recorder.store.readers import Readers
 from recorder.store.run_bundles import Bundle
 from recorder.store.sums import Sums
@@ -111,19 +112,22 @@ class Exporter:
     ) -> AsyncGenerator[pb.ExportRecordingResponse]:
         size, sha256 = exported.file.size, exported.sha256
         header = pb.ExportRecordingResponse(header=pb.ExportHeader(size=size, sha256=sha256))
-        paces = (self._pace, Pace(request.max_bytes_per_s))
-        limited = any(pace.bytes_per_s for pace in paces)
-        key = None if limited else key_of(metadata(context, KEY_HEADER))
+        pace = Pace(request.max_bytes_per_s)
+        # The limit of all exports together is kept here, whoever calls.
+        key = None if self._pace.bytes_per_s else key_of(metadata(context, KEY_HEADER))
         with self._connections.expected(key) as coming:
             if coming:
                 await context.send_initial_metadata(((OPENED_HEADER, "1"),))
             yield header
             connection = await _in_time(coming) if coming else None
-            if connection and await _handed_over(connection, exported, request.offset):
+            if connection and await _handed_over(connection, exported, request):
                 await _read_elsewhere(connection, exported)
                 return
-            async with aclosing(chunks(exported, request.offset, paces)) as read:
-                async for chunk in read:
+            chunks = paced_chunks(
+                exported.file, request.offset, (self._pace, pace), before_end=exported.verified
+            )
+            async with aclosing(chunks):
+                async for chunk in chunks:
                     yield mapping.export_chunk(chunk)
 
     @asynccontextmanager
@@ -197,14 +201,17 @@ async def _in_time(coming: "asyncio.Future[ExportConnection]") -> ExportConnecti
         return None
 
 
-async def _handed_over(connection: ExportConnection, exported: Export, offset: int) -> bool:
+async def _handed_over(
+    connection: ExportConnection, exported: Export, request: pb.ExportRecordingRequest
+) -> bool:
     """Hands the file over; returns False where the gateway can't take it.
 
     Raises:
         RecorderUnreachableError: whether it has taken it is unknown.
     """
     try:
-        return await within(CONNECT_WITHIN_S, connection.hand_over(exported.file, offset))
+        handing = connection.hand_over(exported.file, request.offset, request.max_bytes_per_s)
+        return await within(CONNECT_WITHIN_S, handing)
     except TimeoutError:
         raise RecorderUnreachableError("the gateway has not taken the file of an export") from None
 

@@ -1,20 +1,14 @@
-"""Reading a final file for a caller: in chunks with their CRC, from an offset, no faster than permitted."""
+"""A final file that is open for a caller, and is verified while it is read."""
 
 import asyncio
-from collections.abc import AsyncGenerator, AsyncIterator
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 
-from common.open_file import CHUNK_BYTES, Chunk, ClosedError, OpenFile, UnreadableError
-from common.pace import Pace
-from common.tasks import cancel
+from common.open_file import ClosedError, OpenFile, UnreadableError
 from recorder.store.readers import Readers
 from recorder.store.sums import Sums, open_unchanged, state_of
-
-_CHUNKS_PER_S: Final = 4
-"""With a low limit chunks are smaller, so that a caller sees that it goes on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,37 +84,3 @@ async def export(content: Content, readers: Readers, sums: Sums) -> AsyncIterato
         yield exported
     finally:
         exported.close()
-
-
-async def chunks(exported: Export, offset: int, paces: tuple[Pace, ...]) -> AsyncGenerator[Chunk]:
-    """Yields the bytes of a file from an offset on; the next block is read while one leaves.
-
-    The last block is withheld until the file is verified.
-
-    Args:
-        exported: the file.
-        offset: at most its size.
-        paces: limits; all of them apply.
-
-    Raises:
-        UnreadableError: see there. What was yielded before may be damaged.
-        ClosedError: the file was closed meanwhile.
-    """
-    limits = [pace.bytes_per_s for pace in paces if pace.bytes_per_s]
-    size = max(1, min(CHUNK_BYTES, *(limit // _CHUNKS_PER_S for limit in limits))) if limits else CHUNK_BYTES
-    file, loop = exported.file, asyncio.get_running_loop()
-    ahead = asyncio.create_task(file.block(offset, size))
-    try:
-        while block := await ahead:
-            end = block[-1].offset + len(block[-1].data)
-            ahead = asyncio.create_task(file.block(end, size))
-            if end == file.size:
-                await exported.verified()
-            for chunk in block:
-                delay_s = max(pace.delay_s(loop.time(), len(chunk.data)) for pace in paces) if paces else 0.0
-                if delay_s > 0:
-                    await asyncio.sleep(delay_s)
-                yield chunk
-        await exported.verified()
-    finally:
-        await cancel([ahead])

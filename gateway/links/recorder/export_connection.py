@@ -10,8 +10,9 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 
 from common.deadline import within
-from common.export_connection import CONNECT_WITHIN_S, RANGE, TAKEN
+from common.export_connection import CONNECT_WITHIN_S, ORDER, TAKEN
 from common.open_file import OpenFile
+from common.pace import Pace
 from common.reader_threads import ReaderThreads
 
 _log = logging.getLogger(__name__)
@@ -23,16 +24,19 @@ class HandedFile:
     Args:
         file: open for reading.
         offset: from where on to read it.
+        pace: at which.
         connection: tells the recorder that it is still read.
 
     Attributes:
         file: the same.
         offset: the same.
+        pace: the same.
     """
 
-    def __init__(self, file: OpenFile, offset: int, connection: socket.socket) -> None:
+    def __init__(self, file: OpenFile, offset: int, pace: Pace, connection: socket.socket) -> None:
         self.file = file
         self.offset = offset
+        self.pace = pace
         self._connection = connection
 
     def finish(self) -> None:
@@ -64,25 +68,25 @@ async def handed_file(path: Path, key: bytes, threads: ReaderThreads) -> AsyncIt
             connected.close()
             yield None
             return
-        descriptor, offset, end = taken
+        descriptor, (offset, end, max_bytes_per_s) = taken
         file = OpenFile(descriptor, end, threads)
         try:
-            yield HandedFile(file, offset, connected)
+            yield HandedFile(file, offset, Pace(max_bytes_per_s), connected)
         finally:
             file.close()
 
 
-async def _taken(connected: socket.socket, path: Path, key: bytes) -> tuple[int, int, int] | None:
-    """Returns the descriptor, and from where to where to read; None if the recorder hands over no file."""
+async def _taken(connected: socket.socket, path: Path, key: bytes) -> tuple[int, tuple[int, int, int]] | None:
+    """Returns the descriptor, and the content of ORDER; None if the recorder hands over no file."""
     loop = asyncio.get_running_loop()
     # A Unix socket connects at once, or not at all (EAGAIN: too many connections wait).
     connected.connect(str(path))
     await loop.sock_sendall(connected, key)
     await _readable(connected)
-    data, descriptors, _, _ = socket.recv_fds(connected, RANGE.size, 1)
+    data, descriptors, _, _ = socket.recv_fds(connected, ORDER.size, 1)
     for each in descriptors:
         os.set_inheritable(each, False)  # recv_fds of Python 3.11 takes no flags
-    if not (descriptors and len(data) == RANGE.size and stat.S_ISREG(os.fstat(descriptors[0]).st_mode)):
+    if not (descriptors and len(data) == ORDER.size and stat.S_ISREG(os.fstat(descriptors[0]).st_mode)):
         for each in descriptors:
             os.close(each)
         if data:
@@ -94,8 +98,7 @@ async def _taken(connected: socket.socket, path: Path, key: bytes) -> tuple[int,
     except OSError:
         os.close(descriptors[0])
         raise
-    offset, end = RANGE.unpack(data)
-    return descriptors[0], offset, end
+    return descriptors[0], ORDER.unpack(data)
 
 
 async def _readable(connected: socket.socket) -> None:

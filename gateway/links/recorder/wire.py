@@ -16,6 +16,7 @@ import grpc
 
 from common.export_connection import KEY_BYTES, KEY_HEADER, OPENED_HEADER, socket_beside
 from common.open_file import Chunk, ClosedError
+from common.paced_chunks import paced_chunks
 from common.reader_threads import ReaderThreads
 from common.tasks import cancel
 from gateway.links.grpc_client import lost, unix_channel
@@ -171,29 +172,25 @@ class RecorderClient:
 
 
 async def _chunks(handed: HandedFile, call: Any) -> AsyncGenerator[Chunk]:
-    """Yields the chunks of a file; the next block is read while one leaves.
+    """Yields the chunks of a file, the last ones once the call has ended well.
 
-    The last block is withheld until the call has ended well. The file is closed as soon as the call ends.
+    The file is closed as soon as the call ends.
     """
-    file = handed.file
     ended = asyncio.ensure_future(call.read())
-    ended.add_done_callback(lambda _: file.close())
-    ahead = asyncio.create_task(file.block(handed.offset))
-    try:
-        while block := await ahead:
-            end = block[-1].offset + len(block[-1].data)
-            ahead = asyncio.create_task(file.block(end))
-            if end == file.size:
-                handed.finish()
-                await ended
-            for chunk in block:
-                yield chunk
+    ended.add_done_callback(lambda _: handed.file.close())
+
+    async def verified() -> None:
         handed.finish()
         await ended
+
+    try:
+        async with aclosing(paced_chunks(handed.file, handed.offset, (handed.pace,), verified)) as chunks:
+            async for chunk in chunks:
+                yield chunk
     except ClosedError:
         await ended
     finally:
-        await cancel([ended, ahead])
+        await cancel([ended])
 
 
 def report_from(message: pb.WatchStateResponse) -> RecorderReport:

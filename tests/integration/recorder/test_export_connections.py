@@ -19,7 +19,7 @@ from common.export_connection import (
     CONNECT_WITHIN_S,
     KEY_BYTES,
     KEY_HEADER,
-    RANGE,
+    ORDER,
     TAKEN,
     socket_beside,
 )
@@ -83,7 +83,9 @@ class Robot:
 
 
 @asynccontextmanager
-async def robot(root: Path, monkeypatch: pytest.MonkeyPatch, size: int = 3 * MIB) -> AsyncIterator[Robot]:
+async def robot(
+    root: Path, monkeypatch: pytest.MonkeyPatch, size: int = 3 * MIB, **settings: Any
+) -> AsyncIterator[Robot]:
     handed: list[bytes] = []
 
     @asynccontextmanager
@@ -95,7 +97,7 @@ async def robot(root: Path, monkeypatch: pytest.MonkeyPatch, size: int = 3 * MIB
 
     monkeypatch.setattr(wire, "handed_file", counted)
     address = root / "recorder.sock"
-    async with running_recorder(root / "root") as running, AsyncExitStack() as stack:
+    async with running_recorder(root / "root", **settings) as running, AsyncExitStack() as stack:
         server, connections = rpc.new_server(), ExportConnections()
         readers = stack.enter_context(reader_threads())
         servicer = RecorderServicer(
@@ -193,7 +195,7 @@ async def test_damage_and_deletion_end_the_call_with_the_reason(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async with robot(tmp_path, monkeypatch) as recorder:
-        exported = recorder.client.export(recorder.request(), METADATA)
+        exported = recorder.client.export(recorder.request(max_bytes_per_s=MIB), METADATA)
         await anext(exported)
         await anext(exported)
         assert recorder.handed
@@ -283,17 +285,19 @@ async def test_a_call_with_another_key_gets_its_chunks_at_once(
         assert found == await recorder.over_the_call()
 
 
-@pytest.mark.parametrize("more", [{}, {"max_bytes_per_s": MIB}], ids=["handed over", "over the call"])
+@pytest.mark.parametrize(
+    "settings", [{}, {"export": {"max_bytes_per_s": MIB}}], ids=["handed over", "over the call"]
+)
 async def test_a_deleted_recording_is_closed_at_both_ends_though_nobody_reads(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, more: dict[str, int]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, settings: dict[str, Any]
 ) -> None:
     async with (
-        robot(tmp_path, monkeypatch, 16 * MIB) as recorder,
-        aclosing(recorder.client.export(recorder.request(**more), METADATA)) as exported,
+        robot(tmp_path, monkeypatch, 16 * MIB, **settings) as recorder,
+        aclosing(recorder.client.export(recorder.request(), METADATA)) as exported,
     ):
         await anext(exported)
         await anext(exported)
-        assert bool(recorder.handed) is not bool(more), "a limit is the recorder's to keep"
+        assert bool(recorder.handed) is not bool(settings), "a limit of all exports is the recorder's to keep"
         assert descriptors_of(recorder.path)
         await recorder.running.operations.delete("1", recorder.recording.id, b"", force=True)
 
@@ -328,6 +332,17 @@ async def test_the_descriptor_is_for_reading_this_file_alone(
             assert fcntl.fcntl(each, fcntl.F_GETFD) & fcntl.FD_CLOEXEC
 
 
+@pytest.mark.timed
+async def test_the_gateway_keeps_the_limit_of_an_export(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with robot(tmp_path, monkeypatch, MIB) as recorder:
+        began_s = asyncio.get_running_loop().time()
+        await recorder.exported(max_bytes_per_s=500_000)
+        assert 1.5 < asyncio.get_running_loop().time() - began_s < 4
+        assert recorder.handed
+
+
 async def test_a_second_export_reads_the_file_once_for_both(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -349,10 +364,10 @@ async def test_a_second_export_reads_the_file_once_for_both(
     ("sent", "what"),
     [
         (b"", None),
-        (RANGE.pack(0, 5), None),
-        (RANGE.pack(0, 5)[:-1], "file"),
-        (RANGE.pack(0, 5), "directory"),
-        (RANGE.pack(0, 5), "fifo"),
+        (ORDER.pack(0, 5, 0), None),
+        (ORDER.pack(0, 5, 0)[:-1], "file"),
+        (ORDER.pack(0, 5, 0), "directory"),
+        (ORDER.pack(0, 5, 0), "fifo"),
     ],
 )
 async def test_the_gateway_takes_files_alone(tmp_path: Path, sent: bytes, what: str | None) -> None:
@@ -371,7 +386,7 @@ async def test_the_gateway_takes_files_alone(tmp_path: Path, sent: bytes, what: 
 async def test_the_gateway_reads_the_range_that_it_is_given(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"some bytes of a file")
     descriptor = os.open(tmp_path / "file", os.O_RDONLY)
-    received = await handed_by(tmp_path / "socket", RANGE.pack(5, 10), [descriptor])
+    received = await handed_by(tmp_path / "socket", ORDER.pack(5, 10, 0), [descriptor])
     assert received == (TAKEN, b"bytes")
     os.close(descriptor)
 

@@ -13,7 +13,8 @@ import pytest
 
 from common.open_file import CHUNK_BYTES, Chunk, ClosedError, UnreadableError
 from common.pace import Pace
-from recorder.store.export import Content, chunks, export
+from common.paced_chunks import paced_chunks
+from recorder.store.export import Content, export
 from recorder.store.readers import reader_threads
 from recorder.store.sums import Sums, state_of
 from tests.support.eventually import eventually
@@ -30,7 +31,7 @@ async def exported(file: Content, offset: int = 0, *paces: Pace) -> AsyncGenerat
     with reader_threads() as readers:
         async with (
             export(file, readers, Sums(readers.files)) as opened,
-            aclosing(chunks(opened, offset, paces)) as found,
+            aclosing(paced_chunks(opened.file, offset, paces, opened.verified)) as found,
         ):
             async for each in found:
                 yield each
@@ -94,7 +95,7 @@ async def test_the_first_byte_waits_for_no_sum_and_the_end_does(tmp_path: Path, 
         sums = Sums(readers.files, max_bytes_per_s=slow)
         async with (
             export(file, readers, sums) as opened,
-            aclosing(chunks(opened, offset, ())) as found,
+            aclosing(paced_chunks(opened.file, offset, (), opened.verified)) as found,
         ):
             first = await anext(found)
             assert first.offset == offset
@@ -109,7 +110,7 @@ async def test_a_closed_file_ends_its_export(tmp_path: Path) -> None:
     with reader_threads() as readers:
         async with (
             export(file, readers, Sums(readers.files)) as opened,
-            aclosing(chunks(opened, 0, ())) as found,
+            aclosing(paced_chunks(opened.file, 0, (), opened.verified)) as found,
         ):
             await anext(found)
             opened.close()
