@@ -7,7 +7,7 @@ from typing import Final
 
 import google_crc32c
 
-from common.reader_threads import ReaderThreads
+from common.reader_threads import ClosedError, ReaderThreads
 
 CHUNK_BYTES: Final = 240 * 1024
 """Below the 256 KiB that the contract permits: a chunk that a cut connection costs is sent twice, with what
@@ -18,10 +18,6 @@ BLOCK_CHUNKS: Final = 4
 
 class UnreadableError(Exception):
     """The disk can't read the file, or reads other bytes than were written."""
-
-
-class ClosedError(Exception):
-    """The file has been closed: there is nothing more to read."""
 
 
 @dataclass(frozen=True, slots=True)

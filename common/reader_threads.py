@@ -16,6 +16,10 @@ _RETRY_AFTER_S: Final = 1.0
 """Suggested to a caller for whom there is no place left."""
 
 
+class ClosedError(Exception):
+    """What was to be read is closed: there is nothing more to read."""
+
+
 class ReaderThreads:
     """A few threads and a short queue; used on one event loop.
 
@@ -29,6 +33,7 @@ class ReaderThreads:
         self._what = what
         self._most = most
         self._jobs = 0
+        self._closed = False
         self._threads = ThreadPoolExecutor(threads, thread_name_prefix=f"reads {what}")
 
     async def run(self, work: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
@@ -39,7 +44,10 @@ class ReaderThreads:
 
         Raises:
             TooMuchError: as many jobs as permitted run or wait.
+            ClosedError: the threads have ended.
         """
+        if self._closed:
+            raise ClosedError
         if self._jobs >= self._most:
             raise TooMuchError(
                 f"the robot reads {self._what} for {self._jobs} callers at once, and no more are allowed; "
@@ -78,7 +86,8 @@ class ReaderThreads:
         return descriptors[0]
 
     def close(self) -> None:
-        """Ends the threads after the jobs that run; those that wait are cancelled."""
+        """Ends the threads after the jobs that run; those that wait are cancelled, with their callers."""
+        self._closed = True
         self._threads.shutdown(wait=False, cancel_futures=True)
 
 

@@ -27,9 +27,10 @@ from common.errors import (
     TooMuchError,
 )
 from common.export_connection import CONNECT_WITHIN_S, KEY_HEADER, OPENED_HEADER, key_of
-from common.open_file import ClosedError, UnreadableError
+from common.open_file import UnreadableError
 from common.pace import Pace
 from common.paced_chunks import paced_chunks
+from common.reader_threads import ClosedError
 from common.reasons import Reason
 from common.tasks import first_to_end
 from omniseer.gateway.v1 import recording_pb2 as pb

@@ -6,7 +6,8 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from common.open_file import ClosedError, OpenFile, UnreadableError
+from common.open_file import OpenFile, UnreadableError
+from common.reader_threads import ClosedError
 from recorder.store.readers import Readers
 from recorder.store.sums import Sums, open_unchanged, state_of
 

@@ -12,6 +12,7 @@ import grpc
 from common import bind, rpc
 from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.recorder.v1 import recorder_service_pb2_grpc as pb_grpc
+from recorder.rpc.export_connections import ExportConnections
 from recorder.rpc.servicer import RecorderServicer
 from recorder.store.readers import reader_threads
 from tests.support.recorder_in_process import Running, Source, running_recorder
@@ -41,13 +42,19 @@ async def served(root: Path, **values: Any) -> AsyncIterator[Served]:
     async with running_recorder(root / "root", **values) as running:
         with reader_threads() as readers:
             server = rpc.new_server()
-            servicer = RecorderServicer(running.operations, running.readings, running.settings, readers)
+            connections = ExportConnections()
+            servicer = RecorderServicer(
+                running.operations, running.readings, running.settings, readers, connections
+            )
             servicer.register(server)
             socket = root / "recorder.sock"
             bind.bind_unix(server, socket)
             await server.start()
             try:
-                async with grpc.aio.insecure_channel(f"unix:{socket}") as channel:
+                async with (
+                    connections.listening(socket),
+                    grpc.aio.insecure_channel(f"unix:{socket}") as channel,
+                ):
                     yield Served(pb_grpc.RecorderServiceStub(channel), running)
             finally:
                 await server.stop(None)
@@ -56,7 +63,7 @@ async def served(root: Path, **values: Any) -> AsyncIterator[Served]:
 
 async def exported(stub: Any, **request: Any) -> tuple[pb.ExportHeader, bytes]:
     """The header and the bytes of an export, in which every chunk has been checked."""
-    header, content, offset = pb.ExportHeader(), b"", request.get("offset", 0)
+    header, content, offset = pb.ExportHeader(), bytearray(), request.get("offset", 0)
     async for part in stub.ExportRecording(pb.ExportRecordingRequest(**request)):
         if part.HasField("header"):
             header = part.header
@@ -66,4 +73,4 @@ async def exported(stub: Any, **request: Any) -> tuple[pb.ExportHeader, bytes]:
         assert 0 < len(chunk.data) <= 256 * KIB
         assert chunk.crc32c == google_crc32c.value(chunk.data)
         content += chunk.data
-    return header, content
+    return header, bytes(content)

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, Final
 import grpc
 
 from common.export_connection import KEY_BYTES, KEY_HEADER, OPENED_HEADER, socket_beside
-from common.open_file import Chunk, ClosedError
+from common.open_file import Chunk
 from common.paced_chunks import paced_chunks
-from common.reader_threads import ReaderThreads
+from common.reader_threads import ClosedError, ReaderThreads
 from common.tasks import cancel
 from gateway.links.grpc_client import lost, unix_channel
 from gateway.links.recorder.export_connection import HandedFile, handed_file
@@ -77,16 +77,17 @@ class RecorderConnector:
     @asynccontextmanager
     async def connect(self) -> AsyncIterator["RecorderClient"]:
         """Yields a client; connects with its first call."""
-        # Exports have a connection of their own: reports never wait behind their bytes.
-        async with (
-            unix_channel(self.socket, _MAX_MESSAGE_BYTES) as channel,
-            unix_channel(self.socket, _MAX_MESSAGE_BYTES, ahead_bytes=_EXPORT_AHEAD_BYTES) as exports,
-        ):
-            threads = ReaderThreads("files", threads=_READERS, most=_MOST_READS)
-            try:
+        threads = ReaderThreads("files", threads=_READERS, most=_MOST_READS)
+        try:
+            # Exports have a connection of their own: reports never wait behind their bytes.
+            async with (
+                unix_channel(self.socket, _MAX_MESSAGE_BYTES) as channel,
+                unix_channel(self.socket, _MAX_MESSAGE_BYTES, ahead_bytes=_EXPORT_AHEAD_BYTES) as exports,
+            ):
                 yield RecorderClient(channel, exports, socket_beside(self.socket), threads)
-            finally:
-                threads.close()
+        finally:
+            # Last: the exports' calls have ended, and their files are closed.
+            threads.close()
 
 
 class RecorderClient:

@@ -133,11 +133,13 @@ async def test_viewers_leave_a_place_for_operators_and_one_for_the_bridge(tmp_pa
 async def test_who_takes_nothing_loses_the_place_and_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(export_stream, "STALLED_S", 1.5)
+    monkeypatch.setattr(export_stream, "STALLED_S", 1.0)
     async with places(tmp_path) as robot:
+        robot.recorder.flowing.clear()
         ben, cleo, other = robot.viewers
         held = [await robot.opened(login) for login in (ben, ben, ben, ben, cleo, cleo)]
         assert await refused(to_its_end(robot.export(other))) == FULL
+        robot.recorder.flowing.set()
 
         async def has_a_place() -> bool:
             try:

@@ -35,6 +35,7 @@ from recorder.rpc.export_connections import MAX_UNKNOWN, ExportConnections
 from recorder.rpc.servicer import RecorderServicer
 from recorder.store import sums
 from recorder.store.readers import reader_threads
+from tests.support.descriptors import descriptors_of
 from tests.support.eventually import eventually
 from tests.support.recorder_in_process import Running, Source, running_recorder
 from tests.support.refusals import refused
@@ -305,15 +306,6 @@ async def test_a_deleted_recording_is_closed_at_both_ends_though_nobody_reads(
             return descriptors_of(recorder.path)
 
         await eventually(found, lambda now: not now, "its blocks are free")
-
-
-def descriptors_of(path: Path) -> list[int]:
-    """This process's descriptors of a file, also of a deleted one."""
-    return [
-        int(each.name)
-        for each in Path("/proc/self/fd").iterdir()
-        if each.is_symlink() and str(path) in str(each.readlink())
-    ]
 
 
 async def test_the_descriptor_is_for_reading_this_file_alone(

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import TooMuchError
-from common.reader_threads import ReaderThreads
+from common.reader_threads import ClosedError, ReaderThreads
 from common.reasons import Reason
 
 MOST = 3
@@ -84,3 +84,16 @@ async def test_a_file_that_is_opened_for_a_caller_who_has_left_is_closed(
     if opened:
         with pytest.raises(OSError, match="Bad file descriptor"):
             os.fstat(opened[0])
+
+
+async def test_nothing_is_read_after_the_end(threads: ReaderThreads) -> None:
+    goes_on = threading.Event()
+    runs, waits = (asyncio.create_task(threads.run(goes_on.wait)) for _ in range(2))
+    await asyncio.sleep(0)
+    threads.close()
+    with pytest.raises(ClosedError):
+        await threads.run(goes_on.wait)
+    goes_on.set()
+    assert await runs
+    await asyncio.wait({waits})
+    assert waits.cancelled()

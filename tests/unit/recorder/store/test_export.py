@@ -11,9 +11,10 @@ import google_crc32c
 import psutil
 import pytest
 
-from common.open_file import CHUNK_BYTES, Chunk, ClosedError, UnreadableError
+from common.open_file import CHUNK_BYTES, Chunk, UnreadableError
 from common.pace import Pace
 from common.paced_chunks import paced_chunks
+from common.reader_threads import ClosedError
 from recorder.store.export import Content, export
 from recorder.store.readers import reader_threads
 from recorder.store.sums import Sums, state_of
