@@ -31,7 +31,7 @@ class Rank(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Exporter:
+class ExportCaller:
     """Who exports: the name under which its exports are counted, for people, and the rank."""
 
     name: str
@@ -55,7 +55,9 @@ class ExportStream:
         """Exports that run."""
         return self._open.total()
 
-    async def responses(self, calls: RecorderCalls, request: bytes, caller: Exporter) -> AsyncIterator[bytes]:
+    async def responses(
+        self, calls: RecorderCalls, request: bytes, caller: ExportCaller
+    ) -> AsyncIterator[bytes]:
         """Yields the responses of one export, serialised.
 
         Args:
@@ -79,7 +81,7 @@ class ExportStream:
         finally:
             await place.close()
 
-    def _check_free(self, caller: Exporter) -> None:
+    def _check_free(self, caller: ExportCaller) -> None:
         if self._open[caller.name] >= MAX_OF_A_CALLER:
             raise TooMuchError(
                 f"you have {MAX_OF_A_CALLER} exports running, and no more are allowed; wait until one ends",

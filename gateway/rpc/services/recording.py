@@ -13,7 +13,7 @@ from gateway.links.bridge.uploads import Uploads
 from gateway.links.recorder.calls import RecorderCalls
 from gateway.rpc.calls.call import CallContext
 from gateway.rpc.mapping.cloud import recording_copy
-from gateway.rpc.responses.export_stream import Exporter, ExportStream, Rank
+from gateway.rpc.responses.export_stream import ExportCaller, ExportStream, Rank
 from gateway.status.cloud import RecordingCopy, RecordingCopyState
 from omniseer.gateway.v1.recording_pb2 import (
     CancelUploadRequest,
@@ -100,7 +100,7 @@ class RecordingService:
 
     def export_recording(self, request: ExportRecordingRequest, call: CallContext) -> AsyncIterator[bytes]:
         """Yields a header, then the chunks."""
-        caller = Exporter(_caller(call), self._rank(call))
+        caller = ExportCaller(_caller(call), self._rank(call))
         return self._exports.responses(self._configured(), request.SerializeToString(), caller)
 
     async def upload_recording(
