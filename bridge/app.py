@@ -47,7 +47,7 @@ async def serve(settings: BridgeSettings, stop: asyncio.Event) -> None:
     async with (
         outbox(settings.root, settings.outbox.max_bytes) as kept,
         connect(_address(settings)) as hub,
-        aclosing(GatewayCalls(settings.gateway)) as gateway,
+        aclosing(GatewayCalls(settings.gateway, run_id)) as gateway,
     ):
         robot_status = StatusReader(settings.gateway)
         queue = _queue(settings, kept, hub, gateway, robot_status)

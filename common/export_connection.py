@@ -1,34 +1,36 @@
-"""The connection that carries the chunks of an export from the recorder to the gateway, beside gRPC.
+"""The connection that hands the file of an export from the recorder to the gateway, beside gRPC.
 
-gRPC copies and frames each chunk several times on its way through a Unix socket, which takes more of a
-processor than reading, hashing and sending the file. So the two agree on a connection of the export's own:
+Two programs that pass the same bytes on cost twice the processor of one. So the recorder decides what may be
+read, and the gateway reads it:
 
 1. The gateway calls ExportRecording with the metadata KEY_HEADER, random bytes.
-2. A recorder that can do this answers with the initial metadata CARRIED_HEADER, and the header of the export.
+2. A recorder that can do this answers with the initial metadata OPENED_HEADER, and the header of the export.
 3. The gateway connects to `socket_beside` of the recorder's socket, and sends the key.
-4. The recorder sends the chunks there, each as a length (u32, big endian) and a serialised
-   ExportRecordingResponse, and closes the connection.
-5. The call ends: with OK, or with the reason why there are no more chunks.
+4. The recorder sends ORDER, from where to where and how fast to read, with the file's descriptor, which is
+   open for reading alone (SCM_RIGHTS, unix(7)).
+5. The gateway answers TAKEN, and reads. It withholds the last block, and disconnects.
+6. The call ends: with OK when the whole file has been verified, or at any time with the reason why no more of
+   it may be read. The gateway closes the file.
 
-The call carries the chunks instead where the gateway has not connected within CONNECT_WITHIN_S, as with a
-recorder or a gateway that knows none of this. The gateway need not know which of the two it was: it takes
-what the connection has, then what the call has. Pure.
+The call carries the chunks instead where the gateway does not connect within CONNECT_WITHIN_S, as with a
+recorder or a gateway that knows none of this, or where a limit of all exports together applies, which the
+recorder keeps. The gateway need not know why. Pure.
 """
 
 import struct
 from pathlib import Path
 from typing import Final
 
-KEY_HEADER: Final = "x-export-key"
+KEY_HEADER: Final = "x-export-file-key"
 """Metadata of the call: the key in hexadecimal digits."""
-CARRIED_HEADER: Final = "x-export-carried"
-"""Initial metadata: the chunks come over the connection. Its value has no meaning."""
+OPENED_HEADER: Final = "x-export-file"
+"""Initial metadata: the file comes over the connection. Its value has no meaning."""
 KEY_BYTES: Final = 16
 CONNECT_WITHIN_S: Final = 2.0
-"""From the call to the key's last byte."""
-LENGTH: Final = struct.Struct(">I")
-MAX_MESSAGE_BYTES: Final = 256 * 1024 + 64
-"""A chunk, with what frames it in its message."""
+"""From the call to TAKEN."""
+ORDER: Final = struct.Struct(">QQQ")
+"""The first byte, the one after the last, and how many may leave in a second; 0 for no limit."""
+TAKEN: Final = b"\1"
 
 _SUFFIX: Final = ".exports"
 

@@ -49,6 +49,8 @@ class Reason(StrEnum):
     """As many snapshots as permitted are being made."""
     TOO_MANY_EXPORTS = "TOO_MANY_EXPORTS"
     """The caller, or all callers together, have as many exports running as permitted."""
+    EXPORT_STALLED = "EXPORT_STALLED"
+    """The caller of an export has taken nothing for a minute, and has lost its place."""
     FILE_NOT_FINAL = "FILE_NOT_FINAL"
     """The file is still being written."""
     RECORDING_CHANGED = "RECORDING_CHANGED"

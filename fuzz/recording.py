@@ -3,7 +3,7 @@
 import asyncio
 import struct
 import zlib
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -27,7 +27,7 @@ from recorder.parts import parts_of
 from recorder.readings import Readings
 from recorder.rpc.servicer import RecorderServicer
 from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason
-from recorder.store.run_bundles import RunBundles
+from recorder.store.readers import reader_threads
 from recorder.values import Loss, Note, Sample
 from recorder.video.message import decode
 from recorder.video.stream import Now, Stream, channel
@@ -139,16 +139,17 @@ def _check_item(item: object, payload: bytes) -> None:
 
 
 async def _exported(servicer: RecorderServicer, request: pb.ExportRecordingRequest) -> bytes:
-    context: Any = SimpleNamespace(invocation_metadata=tuple)  # without a connection for the chunks
+    context: Any = SimpleNamespace(invocation_metadata=tuple)  # without a connection for the file
     parts = servicer.ExportRecording(request, context)
     return b"".join([each.chunk.data async for each in parts])
 
 
 @cache
-def _robot() -> tuple[asyncio.AbstractEventLoop, TemporaryDirectory[str], RecorderServicer, bytes]:
-    """Returns a loop, a recorder with one recording of one file in a directory, and the file's content."""
-    directory = TemporaryDirectory(dir=_IN_MEMORY)
-    root = Path(directory.name)
+def _robot() -> tuple[asyncio.AbstractEventLoop, ExitStack, RecorderServicer, bytes]:
+    """Returns a loop, a recorder with one recording of one file in what is kept, and the file's content."""
+    kept = ExitStack()
+    root = Path(kept.enter_context(TemporaryDirectory(dir=_IN_MEMORY)))
+    readers = kept.enter_context(reader_threads())
     loop = asyncio.new_event_loop()
 
     async def made() -> tuple[RecorderServicer, bytes]:
@@ -169,8 +170,8 @@ def _robot() -> tuple[asyncio.AbstractEventLoop, TemporaryDirectory[str], Record
         assert found
         parts.catalogue.write(manifest.with_segment(FILE, found))
         operations: Any = None
-        servicer = RecorderServicer(operations, Readings(parts), RunBundles(()), settings)
+        servicer = RecorderServicer(operations, Readings(parts), settings, readers)
         return servicer, found.path.read_bytes()
 
     servicer, content = loop.run_until_complete(made())
-    return loop, directory, servicer, content
+    return loop, kept, servicer, content

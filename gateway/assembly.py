@@ -133,6 +133,11 @@ class Cloud:
         if self.copies and now.cloud:
             self.copies.take(now.cloud, now.recorder)
 
+    def bridge_run(self) -> str:
+        """Returns the ID of the bridge's run; empty while it does not answer."""
+        newest = self.link.view.newest
+        return newest.instance_id if newest else ""
+
 
 @dataclass(frozen=True, slots=True)
 class Gateway:
@@ -206,7 +211,10 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
         info=InfoService(state, stats, shown_settings(settings)),
         teleop=TeleopService(teleop, state, legacy_clients=settings.teleop.legacy_clients),
         recording=RecordingService(
-            recording.calls if recording else None, exports, cloud.uploads if cloud else None
+            recording.calls if recording else None,
+            exports,
+            cloud.uploads if cloud else None,
+            cloud.bridge_run if cloud else str,
         ),
     )
     interceptors = Interceptors(

@@ -20,7 +20,7 @@ from recorder.rpc.export_connections import ExportConnections
 from recorder.rpc.servicer import SERVICE, RecorderServicer
 from recorder.sources import RobotSources
 from recorder.store.lock import folder_lock
-from recorder.store.run_bundles import RunBundles
+from recorder.store.readers import reader_threads
 from recorder.writing.queue import SampleQueue
 
 _log = logging.getLogger(__name__)
@@ -52,21 +52,23 @@ async def serve(settings: RecorderSettings, stop: asyncio.Event) -> None:
             readings = Readings(parts)
             recorder = Recorder(parts, readings)
             operations = Operations(parts, readings, recorder)
-            bundles = RunBundles(settings.run_bundles)
             server = rpc.new_server()
             connections = ExportConnections()
-            RecorderServicer(operations, readings, bundles, settings, connections).register(server)
-            Health(SERVICE).register(server)
-            bind.bind_unix(server, settings.socket)
-            await server.start()
-            heartbeat.own().ready()
-            _log.info("serving on %s; recordings are in %s", settings.socket, settings.root)
-            async with connections.listening(settings.socket):
-                try:
-                    await recorder.run(stop)
-                finally:
-                    await server.stop(rpc.STOP_GRACE_S)
-                    settings.socket.unlink(missing_ok=True)
+            with reader_threads() as readers:
+                servicer = RecorderServicer(operations, readings, settings, readers, connections)
+                servicer.register(server)
+                Health(SERVICE).register(server)
+                bind.bind_unix(server, settings.socket)
+                await server.start()
+                heartbeat.own().ready()
+                _log.info("serving on %s; recordings are in %s", settings.socket, settings.root)
+                async with connections.listening(settings.socket):
+                    try:
+                        await recorder.run(stop)
+                    finally:
+                        await server.stop(rpc.STOP_GRACE_S)
+                        await servicer.close()
+                        settings.socket.unlink(missing_ok=True)
 
 
 def _own_folders(settings: RecorderSettings) -> list[Path]:

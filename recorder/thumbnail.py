@@ -1,7 +1,7 @@
 """A picture of a recording: the first key frame of its video."""
 
 from dataclasses import dataclass
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import Final
 
@@ -13,7 +13,7 @@ from recorder.video.message import decode
 
 MAX_BYTES: Final = 2 * 1024 * 1024
 _MAX_FRAMES: Final = 900
-"""Of a segment: a key frame comes every two seconds, of at most 120 frames each."""
+"""Looked at in all: a key frame comes every two seconds, of at most 120 frames each."""
 _NS_PER_MS: Final = 1_000_000
 
 
@@ -33,13 +33,12 @@ def find_thumbnail(folder: Path, manifest: Manifest) -> Thumbnail | None:
         OSError: the disk fails.
     """
     video = {index for index, topic in enumerate(manifest.topics) if topic.name == VIDEO_TOPIC}
-    for segment in manifest.segments:
-        if video.isdisjoint(segment.counts):
+    names = [each.name for each in manifest.segments if not video.isdisjoint(each.counts)]
+    frames = chain.from_iterable(messages(folder / name, VIDEO_TOPIC) for name in names)
+    for _, data in islice(frames, _MAX_FRAMES):
+        frame = decode(data)
+        if frame is None or len(frame.unit) > MAX_BYTES:
             continue
-        for _, data in islice(messages(folder / segment.name, VIDEO_TOPIC), _MAX_FRAMES):
-            frame = decode(data)
-            if frame is None or len(frame.unit) > MAX_BYTES:
-                continue
-            if content(Codec(frame.codec), frame.unit).decodable:
-                return Thumbnail(frame.unit, frame.codec, frame.captured_ns // _NS_PER_MS)
+        if content(Codec(frame.codec), frame.unit).decodable:
+            return Thumbnail(frame.unit, frame.codec, frame.captured_ns // _NS_PER_MS)
     return None

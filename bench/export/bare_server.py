@@ -14,8 +14,8 @@ import google_crc32c
 import grpc
 import uvloop
 
+from common.open_file import CHUNK_BYTES
 from omniseer.gateway.v1 import recording_pb2 as pb
-from recorder.store.export import CHUNK_BYTES
 
 METHOD: Final = "/bench.Export/Copy"
 

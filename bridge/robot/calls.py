@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 from bridge.config import GatewaySettings
 from bridge.robot.gateway import credentials
+from common import bridge_run
 from common.errors import UserError
-from console.client import AsyncGatewayClient, results
+from console.client import AsyncGatewayClient, ClientOptions, results
 from console.client.errors import NotAllowed
 
 if TYPE_CHECKING:
@@ -25,10 +26,12 @@ class GatewayCalls:
 
     Args:
         settings: of the gateway.
+        run_id: of this run of the bridge, by which the gateway recognises it.
     """
 
-    def __init__(self, settings: GatewaySettings) -> None:
+    def __init__(self, settings: GatewaySettings, run_id: str) -> None:
         self._settings = settings
+        self._options = ClientOptions(metadata=((bridge_run.HEADER, run_id),))
         self._shown: Credentials | None = None
         self._client: AsyncGatewayClient | None = None
 
@@ -65,7 +68,7 @@ class GatewayCalls:
             shown = credentials(self._settings)
             if self._client and shown == self._shown:
                 return self._client
-            client = AsyncGatewayClient(self._settings.target, credentials=shown)
+            client = AsyncGatewayClient(self._settings.target, self._options, shown)
         except UserError as error:
             raise NotAllowed(error.what, error.remedy) from error
         former, self._client, self._shown = self._client, client, shown

@@ -4,14 +4,14 @@ import asyncio
 import shlex
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import typer
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from common.errors import UserError
+from common.errors import ExitCode, UserError
 from console.cli.session import Session, print_json, with_session
 from console.cli.tables import grid
 from console.cli.transfer_bar import TransferBar
@@ -30,6 +30,8 @@ from console.presentation.recording import (
     remarks,
 )
 
+_LEAST_LIMIT_MBIT: Final = 0.53
+"""As the robot permits: 65536 bytes a second."""
 record_app = typer.Typer(
     help="Record on the robot, keep its last minutes, copy recordings to this computer.",
     add_completion=False,
@@ -206,6 +208,12 @@ def export(
     It goes on by itself when the connection was cut. Of a recording that is still written, it copies what is
     final so far.
     """
+    if 0 < limit_mbit < _LEAST_LIMIT_MBIT:
+        raise UserError(
+            f"--limit {limit_mbit:g} is too low: a copy that takes so long would keep its place from others",
+            f"Choose at least {_LEAST_LIMIT_MBIT:g} Mbit/s",
+            exit_code=ExitCode.USAGE,
+        )
     try:
         asyncio.run(_export(session, recording_id, to, resume=resume, limit_mbit=limit_mbit))
     except KeyboardInterrupt:

@@ -12,7 +12,7 @@ from console.client.clock import Clock, Offset
 from console.client.driving import DriveOptions, DriveSession
 from console.client.errors import DeadlineExceeded, Unreachable, Unsupported
 from console.client.event_feed import EventFeed
-from console.client.exporting import Export, ExportedRecording, ExportOptions, file_bytes
+from console.client.exporting import Export, ExportedRecording, ExportOptions, file_bytes, once_read
 from console.client.mapping import recording
 from console.client.mapping.driving import (
     enabled_request,
@@ -419,8 +419,10 @@ class AsyncGatewayClient:
         Raises:
             UserError: The folder can't be written, or has other files of the same names.
         """
+        options = options or ExportOptions()
         found = await self.recording(recording_id) if isinstance(recording_id, str) else recording_id
-        return await Export(self._transport, found, folder, options or ExportOptions()).run()
+        found = await once_read(found, self.recording, self._transport.sleep, options)
+        return await Export(self._transport, found, folder, options).run()
 
     def read_recording(
         self, recording_id: str, file: results.RecordingFile, offset: int = 0

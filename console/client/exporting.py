@@ -18,7 +18,7 @@ import asyncio
 import hashlib
 import os
 import time
-from collections.abc import AsyncGenerator, Callable
+from collections.abc import AsyncGenerator, Awaitable, Callable
 from contextlib import aclosing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,13 +32,23 @@ from console.client.errors import DeadlineExceeded, GatewayError, GatewayFailed,
 from console.client.export_path import path_below
 from console.client.mapping.methods import EXPORT_RECORDING, Method
 from console.client.mapping.recording import export_request
-from console.client.results import ExportChunk, ExportHeader, Recording, RecordingFile
+from console.client.results import (
+    ExportChunk,
+    ExportHeader,
+    Recording,
+    RecordingFile,
+    RecordingKind,
+    RecordingState,
+)
 
 SILENT_S: Final = 30.0
 """The robot sends a chunk at least every 5 s, however slowly it was requested to send."""
 _FIRST_PAUSE_S: Final = 0.2
 _LONGEST_PAUSE_S: Final = 5.0
 _READ_BYTES: Final = 1024 * 1024
+_ASKED_AGAIN_S: Final = 1.0
+_SLOWEST_READ: Final = 20 * 1024 * 1024
+"""Bytes a second that any disk of a robot reads, at least."""
 _REASONS_TO_WAIT: Final = frozenset({"RECORDER_UNREACHABLE", "TOO_MANY_EXPORTS"})
 """Refusals that end by themselves."""
 
@@ -295,6 +305,49 @@ class Export:
                 waiting,
             )
         )
+
+
+async def once_read(
+    recording: Recording,
+    ask: Callable[[str], Awaitable[Recording]],
+    sleep: Callable[[float], Awaitable[None]],
+    options: ExportOptions,
+) -> Recording:
+    """Returns a recording whose files have sums: a robot reads those of its own experiments when it is asked.
+
+    Args:
+        recording: With its files.
+        ask: Returns it anew.
+        sleep: Pauses.
+        options: `progress` is told what is being waited for.
+
+    Raises:
+        GatewayError: The robot refuses, or no longer answers.
+    """
+    until_s = time.monotonic() + options.give_up_after_s + recording.size / _SLOWEST_READ
+    while _is_being_read(recording) and time.monotonic() < until_s:
+        read = sum(file.final for file in recording.files)
+        options.progress(
+            ExportProgress(
+                "", read, len(recording.files), 0, recording.size, waiting="the robot reads the files"
+            )
+        )
+        await sleep(_ASKED_AGAIN_S)
+        try:
+            recording = await ask(recording.id)
+        except GatewayError as error:
+            if not _may_pass(error):
+                raise
+    return recording
+
+
+def _is_being_read(recording: Recording) -> bool:
+    """Whether files of a run bundle that has ended still have no sums."""
+    bundle, ended = (
+        recording.kind is RecordingKind.RUN_BUNDLE,
+        recording.state is not RecordingState.RECORDING,
+    )
+    return bundle and ended and not all(file.final for file in recording.files)
 
 
 async def file_bytes(

@@ -42,6 +42,8 @@ class ClientOptions:
     """Pauses between the connections of a stream, which reconnects for as long as it is read."""
     keepalive_every_s: float = 2.0
     """Interval of pings on a silent connection."""
+    metadata: tuple[tuple[str, str], ...] = ()
+    """Sent with every call, beside the credentials."""
     keepalive_within_s: float = 2.0
     """Deadline of a ping's answer. A half-dead link is noticed after the sum of both at the latest."""
 

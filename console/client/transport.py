@@ -32,7 +32,7 @@ class GrpcTransport:
 
     def __init__(self, target: str, options: ClientOptions, credentials: Credentials) -> None:
         self._target = target
-        self._metadata = credentials.metadata()
+        self._metadata = (*credentials.metadata(), *options.metadata)
         arguments = options.channel_options()
         self._channel = (
             grpc.aio.secure_channel(target, _tls(credentials), options=arguments)

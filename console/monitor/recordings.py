@@ -27,6 +27,7 @@ from console.client import (
     ExportOptions,
     ExportProgress,
     GatewayError,
+    Overloaded,
     Recording,
     RecordingStatus,
 )
@@ -343,7 +344,7 @@ class Recordings:
             try:
                 picture = await self._pictures.picture(recording, fetch)
             except GatewayError as error:
-                if not error.reason:
+                if not error.reason or isinstance(error, Overloaded):
                     return False
                 # A refusal: it has no key frame, for example.
                 picture = b""

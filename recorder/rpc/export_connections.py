@@ -1,21 +1,21 @@
-"""Connections that carry the chunks of exports to the gateway (common/export_connection.py says how).
+"""Connections that hand the files of exports to the gateway (common/export_connection.py says how).
 
 What can fail, and what follows:
 
 | failure | follows |
 |---|---|
 | the socket can't be bound | the log says why; chunks go over gRPC, which is slower |
-| the gateway knows nothing of this, or does not connect | chunks go over gRPC |
+| the gateway knows nothing of this, does not connect, or can't take a descriptor | chunks go over gRPC |
 | something connects with another key, or sends none | disconnected, after CONNECT_WITHIN_S at the latest |
 | more of these than MAX_UNKNOWN | the next one is disconnected at once |
 | the gateway reads slowly, or not at all | the export waits; it ends with its call, as with gRPC |
-| the gateway disconnects | the call ends with UNAVAILABLE |
+| the gateway ends while it reads | so does its call |
 """
 
 import asyncio
 import logging
 import socket
-from collections.abc import AsyncIterator, Iterator, Sequence
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
 from typing import Final
@@ -23,17 +23,14 @@ from typing import Final
 from common import bind
 from common.deadline import within
 from common.errors import UserError
-from common.export_connection import CONNECT_WITHIN_S, KEY_BYTES, LENGTH, socket_beside
+from common.export_connection import CONNECT_WITHIN_S, KEY_BYTES, ORDER, TAKEN, socket_beside
+from common.open_file import OpenFile
 from common.tasks import cancel
-from recorder.rpc.export_message import message_parts
-from recorder.store.export import Chunk
 
 _log = logging.getLogger(__name__)
 
 MAX_UNKNOWN: Final = 16
 """Connections that have not sent a key yet."""
-_SEND_BUFFER_BYTES: Final = 1024 * 1024
-"""Asked of the kernel, which permits less by default (net.core.wmem_max)."""
 _PAUSE_S: Final = 1.0
 """Before the next attempt to accept a connection, where the process has no descriptor left."""
 
@@ -46,29 +43,28 @@ class ExportConnection:
     """
 
     def __init__(self, connected: socket.socket) -> None:
-        connected.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
         self._socket = connected
 
-    async def send(self, chunk: Chunk) -> None:
-        """Sends a chunk; returns when the kernel has taken all of it.
-
-        Raises:
-            ConnectionError: the gateway has disconnected.
-        """
-        message = message_parts(chunk)
-        parts: Sequence[bytes] = (LENGTH.pack(sum(map(len, message))), *message)
+    async def hand_over(self, file: OpenFile, offset: int, max_bytes_per_s: int) -> bool:
+        """Hands a file over, to be read from an offset on; returns whether the gateway has taken it."""
         try:
-            sent = self._socket.sendmsg(parts)
-        except BlockingIOError:
-            sent = 0
-        loop = asyncio.get_running_loop()
-        for part in parts:
-            if sent < len(part):
-                await loop.sock_sendall(self._socket, memoryview(part)[sent:])
-            sent = max(0, sent - len(part))
+            # Nothing has been sent before: there is room for it.
+            order = ORDER.pack(offset, file.size, max_bytes_per_s)
+            socket.send_fds(self._socket, [order], [file.descriptor])
+            return await _received(self._socket, len(TAKEN)) == TAKEN
+        except OSError as error:
+            _log.info("an export's file can't be handed over: %s", error.strerror or error)
+            return False
+
+    async def disconnected(self) -> None:
+        """Returns when the gateway has read everything, or is gone."""
+        try:
+            await _received(self._socket, 1)
+        except OSError as error:
+            _log.info("an export's connection: %s", error.strerror or error)
 
     def close(self) -> None:
-        """Closes it: the gateway still gets what was sent."""
+        """Closes it."""
         self._socket.close()
 
 

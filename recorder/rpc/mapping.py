@@ -5,13 +5,13 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from common.errors import InvalidRequestError
+from common.open_file import Chunk
 from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
 from recorder.config import RecorderSettings
 from recorder.lifecycle import State
 from recorder.readings import Readings
 from recorder.requests import Live
-from recorder.store.export import Chunk
 from recorder.store.manifest import Copy, CopyState, Kind, Manifest, RecordingState, StopReason
 from recorder.store.run_bundles import Bundle
 from recorder.values import Gap, GapCause

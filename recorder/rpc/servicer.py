@@ -1,22 +1,12 @@
 """RecorderService: receives, maps, calls, maps, replies."""
 
-import asyncio
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator
 from contextlib import aclosing
 from typing import Any, Final
 
 import grpc
 
-from common.deadline import within
-from common.errors import (
-    ConflictError,
-    DamagedError,
-    InvalidRequestError,
-    NotFoundError,
-    PreconditionError,
-)
-from common.export_connection import CARRIED_HEADER, CONNECT_WITHIN_S, KEY_HEADER, key_of
-from common.pace import Pace
+from common.errors import InvalidRequestError, NotFoundError, PreconditionError
 from common.reasons import Reason
 from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
@@ -26,10 +16,13 @@ from recorder.operations import Operations
 from recorder.readings import Readings
 from recorder.requests import Result, SnapshotOptions, StartOptions
 from recorder.rpc import mapping
-from recorder.rpc.export_connections import ExportConnection, ExportConnections
-from recorder.store.export import Content, UnreadableError, chunks
+from recorder.rpc.export_connections import ExportConnections
+from recorder.rpc.exporter import Exporter, metadata
+from recorder.store.bundle_reader import BundleReader
 from recorder.store.manifest import Manifest
+from recorder.store.readers import Readers
 from recorder.store.run_bundles import Bundle, RunBundles
+from recorder.store.sums import Sums
 from recorder.thumbnail import find_thumbnail
 
 SERVICE: Final = recorder_pb.DESCRIPTOR.services_by_name["RecorderService"].full_name
@@ -48,25 +41,37 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
     Args:
         operations: of the recorder.
         readings: of the same.
-        bundles: the robot's own experiments.
         settings: of the program.
-        connections: carry exports to a gateway that connects there; None: gRPC carries all of them.
+        readers: threads that read the disk for callers.
+        connections: hand files of exports over to a gateway that connects there; None: gRPC carries all.
     """
 
     def __init__(
         self,
         operations: Operations,
         readings: Readings,
-        bundles: RunBundles,
         settings: RecorderSettings,
+        readers: Readers,
         connections: ExportConnections | None = None,
     ) -> None:
+        sums = Sums(readers.files)
         self._operations = operations
         self._readings = readings
-        self._bundles = bundles
         self._settings = settings
-        self._pace = Pace(settings.export.max_bytes_per_s)
-        self._connections = connections or ExportConnections()
+        self._readers = readers
+        self._bundles = BundleReader(RunBundles(settings.run_bundles), readers.looks, sums)
+        self._exporter = Exporter(
+            readings,
+            self._bundles,
+            readers,
+            sums,
+            connections=connections or ExportConnections(),
+            max_bytes_per_s=settings.export.max_bytes_per_s,
+        )
+
+    async def close(self) -> None:
+        """Ends what is read in the background."""
+        await self._bundles.close()
 
     def register(self, server: grpc.aio.Server) -> None:
         """Adds the methods to a server."""
@@ -118,8 +123,7 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         self, request: pb.ListRecordingsRequest, _context: grpc.aio.ServicerContext[Any, Any]
     ) -> pb.ListRecordingsResponse:
         """Returns a page of the list."""
-        bundles = await asyncio.to_thread(self._bundles.all)
-        listed: list[Manifest | Bundle] = [*self._readings.recordings, *bundles]
+        listed: list[Manifest | Bundle] = [*self._readings.recordings, *await self._bundles.all()]
         listed.sort(key=_place, reverse=True)
         if request.page_token:
             listed = _after(listed, request.page_token)
@@ -136,8 +140,7 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
     ) -> pb.GetRecordingResponse:
         """Returns a recording with its files."""
         if bundle := await self._bundle(request.recording_id):
-            sums = await asyncio.to_thread(self._sums, bundle)
-            return pb.GetRecordingResponse(recording=mapping.bundle(bundle, sums))
+            return pb.GetRecordingResponse(recording=mapping.bundle(bundle, await self._bundles.sums(bundle)))
         manifest = self._readings.get(request.recording_id)
         return pb.GetRecordingResponse(recording=mapping.recording(self._readings, manifest, whole=True))
 
@@ -146,48 +149,17 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
     ) -> AsyncIterator[pb.ExportRecordingResponse]:
         """Streams a final file."""
         bundle = await self._bundle(request.recording_id)
-        content = await self._content(request, bundle)
-        if request.expected_sha256 and request.expected_sha256 != content.sha256:
-            raise ConflictError(
-                f"{request.file} is another file than the one that was begun; begin anew",
-                Reason.RECORDING_CHANGED,
-            )
-        if request.offset > content.size:
-            raise InvalidRequestError(f"offset {request.offset} is beyond the end, {content.size}")
-        header = pb.ExportHeader(size=content.size, sha256=content.sha256)
-
-        def check() -> None:
-            if bundle is None and not self._readings.has(request.recording_id):
-                raise ConflictError(
-                    f"recording {request.recording_id} was deleted meanwhile", Reason.RECORDING_DELETED
-                )
-
-        paces = (self._pace, Pace(request.max_bytes_per_s))
-        key = key_of(_metadata(context, KEY_HEADER))
-        try:
-            with self._connections.expected(key) as coming:
-                if coming:
-                    await context.send_initial_metadata(((CARRIED_HEADER, "1"),))
-                yield pb.ExportRecordingResponse(header=header)
-                connection = await _in_time(coming) if coming else None
-                async with aclosing(chunks(content, request.offset, paces, check)) as parts:
-                    async for chunk in parts:
-                        if connection:
-                            await connection.send(chunk)
-                        else:
-                            yield mapping.export_chunk(chunk)
-        except ConnectionError:
-            await context.abort(grpc.StatusCode.UNAVAILABLE, "the connection of the export was closed")
-        except UnreadableError as error:
-            check()
-            raise DamagedError(f"{request.file}: {error}") from error
+        async with aclosing(self._exporter.responses(request, bundle, context)) as responses:
+            async for response in responses:
+                yield response
 
     async def GetRecordingThumbnail(  # noqa: N802  # the schema names it
         self, request: pb.GetRecordingThumbnailRequest, _context: grpc.aio.ServicerContext[Any, Any]
     ) -> pb.GetRecordingThumbnailResponse:
         """Returns a key frame."""
         manifest = self._readings.get(request.recording_id)
-        found = await asyncio.to_thread(find_thumbnail, self._readings.folder_of(manifest), manifest)
+        folder = self._readings.folder_of(manifest)
+        found = await self._readers.looks.run(find_thumbnail, folder, manifest)
         if found is None:
             raise NotFoundError(
                 f"{manifest.id} has no key frame of video that is final", Reason.RECORDING_NOT_FOUND
@@ -239,11 +211,7 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         return mapping.bundle(each) if isinstance(each, Bundle) else mapping.recording(self._readings, each)
 
     async def _bundle(self, recording_id: str) -> Bundle | None:
-        return (
-            None
-            if self._readings.has(recording_id)
-            else await asyncio.to_thread(self._bundles.get, recording_id)
-        )
+        return None if self._readings.has(recording_id) else await self._bundles.get(recording_id)
 
     async def _refuse_bundle(self, recording_id: str) -> None:
         if await self._bundle(recording_id):
@@ -251,42 +219,6 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
                 f"{recording_id} is a folder of the robot's own experiments, which is never changed here",
                 Reason.RECORDING_READ_ONLY,
             )
-
-    def _sums(self, bundle: Bundle) -> dict[str, bytes]:
-        """Returns the sums of a bundle's files, without those that can't be read; in a thread."""
-        if not bundle.final:
-            return {}
-        sums = {}
-        for file in bundle.files:
-            try:
-                sums[file.name] = self._bundles.sha256(bundle, file)
-            except OSError:
-                continue
-        return sums
-
-    async def _content(self, request: pb.ExportRecordingRequest, bundle: Bundle | None) -> Content:
-        if bundle:
-            return await self._bundle_content(bundle, request.file)
-        manifest = self._readings.get(request.recording_id)
-        for file in manifest.files:
-            if file.name == request.file:
-                path = self._readings.folder_of(manifest) / file.name
-                return Content(path, file.size, bytes.fromhex(file.sha256))
-        if request.file == self._readings.live(manifest).part:
-            raise _not_final(request.file)
-        raise _no_such_file(manifest.id, request.file)
-
-    async def _bundle_content(self, bundle: Bundle, name: str) -> Content:
-        file = bundle.file(name)
-        if file is None:
-            raise _no_such_file(bundle.id, name)
-        if not bundle.final:
-            raise _not_final(name)
-        try:
-            sha256 = await asyncio.to_thread(self._bundles.sha256, bundle, file)
-        except OSError as error:
-            raise DamagedError(f"{name}: the disk can't read it: {error.strerror}") from error
-        return Content(bundle.folder / file.name, file.size, sha256)
 
 
 def _request_id(request: Any) -> str:
@@ -301,21 +233,7 @@ def _request_id(request: Any) -> str:
 
 
 def _caller(context: grpc.aio.ServicerContext[Any, Any]) -> str:
-    return str(_metadata(context, _CALLER))[:_LONGEST_CALLER]
-
-
-def _metadata(context: grpc.aio.ServicerContext[Any, Any], wanted: str) -> str | bytes:
-    """Returns the first value of a key; empty without one."""
-    metadata: Sequence[tuple[str, str | bytes]] = tuple(context.invocation_metadata() or ())
-    return next((value for key, value in metadata if key == wanted), "")
-
-
-async def _in_time(coming: "asyncio.Future[ExportConnection]") -> ExportConnection | None:
-    """Returns the connection of an export; None if the gateway does not connect."""
-    try:
-        return await within(CONNECT_WITHIN_S, coming)
-    except TimeoutError:
-        return None
+    return str(metadata(context, _CALLER))[:_LONGEST_CALLER]
 
 
 def _place(each: Manifest | Bundle) -> tuple[int, str]:
@@ -333,13 +251,3 @@ def _after(listed: list[Manifest | Bundle], token: str) -> list[Manifest | Bundl
         raise InvalidRequestError("page_token is none that this robot has issued")
     place = (int(instant), last)
     return [each for each in listed if _place(each) < place]
-
-
-def _no_such_file(recording_id: str, name: str) -> NotFoundError:
-    text = f"{recording_id} has no file '{name}'; GetRecording has those there are"
-    return NotFoundError(text, Reason.RECORDING_NOT_FOUND)
-
-
-def _not_final(name: str) -> PreconditionError:
-    text = f"{name} is still being written; wait for the next file, or stop the recording"
-    return PreconditionError(text, Reason.FILE_NOT_FINAL)

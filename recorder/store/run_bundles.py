@@ -83,7 +83,6 @@ class RunBundles:
 
     def __init__(self, folders: Sequence[Path]) -> None:
         self._folders = tuple(folders)
-        self._sums: dict[tuple[Path, int, int], bytes] = {}
 
     def all(self) -> list[Bundle]:
         """Returns all bundles, without those that can't be read."""
@@ -100,36 +99,27 @@ class RunBundles:
 
     def get(self, bundle_id: str) -> Bundle | None:
         """Returns a bundle; None if there is no such."""
-        for folder in self._candidates():
-            if _id_of(folder.name) == bundle_id:
-                try:
-                    return _read(folder)
-                except OSError:
-                    return None
+        if not bundle_id.startswith(_PREFIX):
+            return None
+        for folder in self._candidates(bundle_id):
+            try:
+                return _read(folder)
+            except OSError:
+                return None
         return None
 
-    def sha256(self, bundle: Bundle, file: BundleFile) -> bytes:
-        """Returns the sum of a file's content, 32 bytes; reads the file the first time.
-
-        Raises:
-            OSError: the disk fails, or the file has gone.
-        """
-        path = bundle.folder / file.name
-        key = (path, file.size, file.changed_ns)
-        if key not in self._sums:
-            if len(self._sums) >= MAX_FILES:
-                self._sums.clear()
-            with path.open("rb") as content:
-                self._sums[key] = hashlib.file_digest(content, "sha256").digest()
-        return self._sums[key]
-
-    def _candidates(self) -> Iterator[Path]:
+    def _candidates(self, bundle_id: str = "") -> Iterator[Path]:
+        """Yields the folders that are bundles: those with an ID, or all."""
         for parent in self._folders:
             try:
                 entries = sorted(parent.iterdir())
             except OSError:
                 continue
-            yield from (each for each in entries if not each.is_symlink() and (each / _MANIFEST).is_file())
+            for each in entries:
+                if bundle_id and _id_of(each.name) != bundle_id:
+                    continue
+                if not each.is_symlink() and (each / _MANIFEST).is_file():
+                    yield each
 
 
 def _id_of(name: str) -> str:

@@ -4,6 +4,8 @@ from collections.abc import AsyncGenerator, Mapping
 from contextlib import aclosing
 from typing import Final
 
+from common.errors import DamagedError
+from common.open_file import Chunk, UnreadableError
 from gateway.links.grpc_client import call_metadata
 from gateway.links.recorder.refusals import REFUSALS, unreachable
 from gateway.links.recorder.wire import RecorderClient
@@ -37,16 +39,19 @@ class RecorderCalls(SharingConnector[RecorderClient]):
         with REFUSALS.as_domain_errors():
             return await self._connected().call(method, request, timeout_s, call_metadata(caller))
 
-    async def export(self, request: bytes, caller: str) -> AsyncGenerator[bytes]:
-        """Passes an export on: yields its responses, serialised, each as it is taken.
+    async def export(self, request: bytes, caller: str) -> AsyncGenerator[bytes | Chunk]:
+        """Passes an export on: yields its responses, serialised, or chunks of the file, each as it is taken.
 
         Raises:
             DomainError: the recorder refuses, or is gone.
         """
         async with aclosing(self._connected().export(request, call_metadata(caller))) as responses:
-            with REFUSALS.as_domain_errors():
-                async for response in responses:
-                    yield response
+            try:
+                with REFUSALS.as_domain_errors():
+                    async for response in responses:
+                        yield response
+            except UnreadableError as error:
+                raise DamagedError(f"the file on the robot: {error}") from error
 
     async def report_fault(self, fault: Condition) -> str:
         """Reports a fault; returns the incident that it became, empty for none.

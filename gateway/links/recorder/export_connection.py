@@ -1,59 +1,112 @@
-"""The gateway's end of the connection that carries an export's chunks (common/export_connection.py)."""
+"""The gateway's end of the connection that hands over an export's file (common/export_connection.py)."""
 
 import asyncio
 import logging
+import os
 import socket
-from collections.abc import AsyncGenerator
+import stat
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import Final
 
-from common.export_connection import LENGTH, MAX_MESSAGE_BYTES
+from common.deadline import within
+from common.export_connection import CONNECT_WITHIN_S, ORDER, TAKEN
+from common.open_file import OpenFile
+from common.pace import Pace
+from common.reader_threads import ReaderThreads
 
 _log = logging.getLogger(__name__)
 
-_LONGEST: Final = max(LENGTH.size, MAX_MESSAGE_BYTES)
+
+class HandedFile:
+    """A file that the recorder has handed over.
+
+    Args:
+        file: open for reading.
+        offset: from where on to read it.
+        pace: at which.
+        connection: tells the recorder that it is still read.
+
+    Attributes:
+        file: the same.
+        offset: the same.
+        pace: the same.
+    """
+
+    def __init__(self, file: OpenFile, offset: int, pace: Pace, connection: socket.socket) -> None:
+        self.file = file
+        self.offset = offset
+        self.pace = pace
+        self._connection = connection
+
+    def finish(self) -> None:
+        """Tells the recorder that everything has been read."""
+        self._connection.close()
 
 
-async def carried_messages(path: Path, key: bytes) -> AsyncGenerator[bytes]:
-    """Yields what a connection to the recorder carries, each message when it is taken, until it ends.
-
-    Ends without a message where the recorder can't be connected to, and with the last whole message where it
-    vanishes: the export's call has what is missing, or the reason.
+@asynccontextmanager
+async def handed_file(path: Path, key: bytes, threads: ReaderThreads) -> AsyncIterator[HandedFile | None]:
+    """Takes the file of an export, and closes it when the block ends.
 
     Args:
         path: where the recorder takes such connections.
         key: of the export.
+        threads: that read the file.
+
+    Yields:
+        The file; None where the recorder can't be connected to, or hands none over: the export's call has the
+        chunks, or the reason.
     """
-    loop = asyncio.get_running_loop()
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK) as connected:
         try:
-            # A Unix socket connects at once, or not at all (EAGAIN: too many connections wait).
-            connected.connect(str(path))
-            await loop.sock_sendall(connected, key)
-            # One buffer for all: most of a message's cost is memory that is touched for the first time.
-            buffer = memoryview(bytearray(_LONGEST))
-            while await _fill(connected, buffer[: LENGTH.size]):
-                (size,) = LENGTH.unpack(buffer[: LENGTH.size])
-                if size > MAX_MESSAGE_BYTES:
-                    _log.warning("the recorder announced an export's message of %d bytes; disconnected", size)
-                    return
-                message = buffer[:size]
-                if not await _fill(connected, message):
-                    return
-                yield bytes(message)
+            taken = await within(CONNECT_WITHIN_S, _taken(connected, path, key))
         except OSError as error:
-            _log.info("an export's connection to the recorder: %s", error.strerror or error)
-
-
-async def _fill(connected: socket.socket, room: memoryview) -> bool:
-    """Receives as many bytes as there is room for; False if the connection ends before."""
-    loop = asyncio.get_running_loop()
-    while room:
+            _log.info("an export's connection to the recorder: %s", error.strerror or "no answer")
+            taken = None
+        if taken is None:
+            # First: the recorder then knows that its call has to carry the chunks.
+            connected.close()
+            yield None
+            return
+        descriptor, (offset, end, max_bytes_per_s) = taken
+        file = OpenFile(descriptor, end, threads)
         try:
-            size = connected.recv_into(room)
-        except BlockingIOError:
-            size = await loop.sock_recv_into(connected, room)
-        if not size:
-            return False
-        room = room[size:]
-    return True
+            yield HandedFile(file, offset, Pace(max_bytes_per_s), connected)
+        finally:
+            file.close()
+
+
+async def _taken(connected: socket.socket, path: Path, key: bytes) -> tuple[int, tuple[int, int, int]] | None:
+    """Returns the descriptor, and the content of ORDER; None if the recorder hands over no file."""
+    loop = asyncio.get_running_loop()
+    # A Unix socket connects at once, or not at all (EAGAIN: too many connections wait).
+    connected.connect(str(path))
+    await loop.sock_sendall(connected, key)
+    await _readable(connected)
+    data, descriptors, _, _ = socket.recv_fds(connected, ORDER.size, 1)
+    for each in descriptors:
+        os.set_inheritable(each, False)  # recv_fds of Python 3.11 takes no flags
+    if not (descriptors and len(data) == ORDER.size and stat.S_ISREG(os.fstat(descriptors[0]).st_mode)):
+        for each in descriptors:
+            os.close(each)
+        if data:
+            _log.warning("the recorder has handed over no file for an export; disconnected")
+        return None
+    try:
+        # One byte in an empty buffer never waits.
+        connected.send(TAKEN)
+    except OSError:
+        os.close(descriptors[0])
+        raise
+    return descriptors[0], ORDER.unpack(data)
+
+
+async def _readable(connected: socket.socket) -> None:
+    """Returns when there is something to receive, or the connection has ended."""
+    loop = asyncio.get_running_loop()
+    readable = asyncio.Event()
+    loop.add_reader(connected, readable.set)
+    try:
+        await readable.wait()
+    finally:
+        loop.remove_reader(connected)

@@ -4,6 +4,7 @@ Its messages are mostly those of the operators' contract. They are passed on as 
 no knowledge of them, and an export costs the gateway no parsing.
 """
 
+import asyncio
 import secrets
 from collections.abc import AsyncGenerator, AsyncIterator, Sequence
 from contextlib import aclosing, asynccontextmanager
@@ -13,9 +14,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import grpc
 
-from common.export_connection import CARRIED_HEADER, KEY_BYTES, KEY_HEADER, socket_beside
+from common.export_connection import KEY_BYTES, KEY_HEADER, OPENED_HEADER, socket_beside
+from common.open_file import Chunk
+from common.paced_chunks import paced_chunks
+from common.reader_threads import ClosedError, ReaderThreads
+from common.tasks import cancel
 from gateway.links.grpc_client import lost, unix_channel
-from gateway.links.recorder.export_connection import carried_messages
+from gateway.links.recorder.export_connection import HandedFile, handed_file
 from gateway.links.watch import LinkLostError
 from gateway.links.wire_values import by_number, same_fields
 from gateway.status.cloud import CopyReport, RecordingCopyState
@@ -43,6 +48,10 @@ Metadata = Sequence[tuple[str, str]]
 _SERVICE: Final = f"/{pb.DESCRIPTOR.services_by_name['RecorderService'].full_name}"
 _MAX_MESSAGE_BYTES: Final = 4 * 1024 * 1024
 """A thumbnail has up to 2 MiB, a recording up to 10000 files."""
+_READERS: Final = 3
+"""Threads that read files of exports: a disk that hangs keeps nothing else of the gateway waiting."""
+_MOST_READS: Final = 64
+"""More than all exports that there may be."""
 _EXPORT_AHEAD_BYTES: Final = 1024 * 1024
 """Four chunks of each export, so that the recorder sends the next ones while one is passed on."""
 _REPORT: Final = pb.WatchStateResponse.DESCRIPTOR.fields_by_name
@@ -68,12 +77,17 @@ class RecorderConnector:
     @asynccontextmanager
     async def connect(self) -> AsyncIterator["RecorderClient"]:
         """Yields a client; connects with its first call."""
-        # Exports have a connection of their own: reports never wait behind their bytes.
-        async with (
-            unix_channel(self.socket, _MAX_MESSAGE_BYTES) as channel,
-            unix_channel(self.socket, _MAX_MESSAGE_BYTES, ahead_bytes=_EXPORT_AHEAD_BYTES) as exports,
-        ):
-            yield RecorderClient(channel, exports, socket_beside(self.socket))
+        threads = ReaderThreads("files", threads=_READERS, most=_MOST_READS)
+        try:
+            # Exports have a connection of their own: reports never wait behind their bytes.
+            async with (
+                unix_channel(self.socket, _MAX_MESSAGE_BYTES) as channel,
+                unix_channel(self.socket, _MAX_MESSAGE_BYTES, ahead_bytes=_EXPORT_AHEAD_BYTES) as exports,
+            ):
+                yield RecorderClient(channel, exports, socket_beside(self.socket), threads)
+        finally:
+            # Last: the exports' calls have ended, and their files are closed.
+            threads.close()
 
 
 class RecorderClient:
@@ -82,12 +96,20 @@ class RecorderClient:
     Args:
         channel: for all methods but one.
         exports: for ExportRecording.
-        carried_at: where the recorder takes connections that carry the chunks of exports.
+        files_at: where the recorder takes connections by which it hands over the files of exports.
+        threads: that read these files.
     """
 
-    def __init__(self, channel: grpc.aio.Channel, exports: grpc.aio.Channel, carried_at: Path) -> None:
+    def __init__(
+        self,
+        channel: grpc.aio.Channel,
+        exports: grpc.aio.Channel,
+        files_at: Path,
+        threads: ReaderThreads,
+    ) -> None:
         self._channel = channel
-        self._carried_at = carried_at
+        self._files_at = files_at
+        self._threads = threads
         self._exports = exports
         self._stub: RecorderServiceAsyncStub = RecorderServiceStub(channel)
 
@@ -106,8 +128,12 @@ class RecorderClient:
         response: bytes = await call(request, timeout=timeout_s, metadata=tuple(metadata))
         return response
 
-    async def export(self, request: bytes, metadata: Metadata) -> AsyncGenerator[bytes]:
-        """Yields the responses of ExportRecording as they are on the wire."""
+    async def export(self, request: bytes, metadata: Metadata) -> AsyncGenerator[bytes | Chunk]:
+        """Yields what ExportRecording responds with: as it is on the wire, or chunks of the file itself.
+
+        Raises:
+            UnreadableError: the disk can't read the file.
+        """
         key = secrets.token_bytes(KEY_BYTES)
         method: Any = self._exports.unary_stream(f"{_SERVICE}/ExportRecording")
         call: Any = method(request, metadata=(*metadata, (KEY_HEADER, key.hex())))
@@ -115,11 +141,13 @@ class RecorderClient:
             if (header := await call.read()) is grpc.aio.EOF:
                 return
             yield header
-            if any(name == CARRIED_HEADER for name, _ in await call.initial_metadata()):
-                async with aclosing(carried_messages(self._carried_at, key)) as carried:
-                    async for response in carried:
-                        yield response
-            # The status, and the chunks that no connection has carried.
+            if any(name == OPENED_HEADER for name, _ in await call.initial_metadata()):
+                async with handed_file(self._files_at, key, self._threads) as handed:
+                    if handed:
+                        async with aclosing(_chunks(handed, call)) as chunks:
+                            async for chunk in chunks:
+                                yield chunk
+            # The status, and the chunks of a file that was not handed over.
             while (response := await call.read()) is not grpc.aio.EOF:
                 yield response
         finally:
@@ -142,6 +170,28 @@ class RecorderClient:
             copy.bytes_done,
         )
         await self._stub.SetCopy(request, timeout=timeout_s)
+
+
+async def _chunks(handed: HandedFile, call: Any) -> AsyncGenerator[Chunk]:
+    """Yields the chunks of a file, the last ones once the call has ended well.
+
+    The file is closed as soon as the call ends.
+    """
+    ended = asyncio.ensure_future(call.read())
+    ended.add_done_callback(lambda _: handed.file.close())
+
+    async def verified() -> None:
+        handed.finish()
+        await ended
+
+    try:
+        async with aclosing(paced_chunks(handed.file, handed.offset, (handed.pace,), verified)) as chunks:
+            async for chunk in chunks:
+                yield chunk
+    except ClosedError:
+        await ended
+    finally:
+        await cancel([ended])
 
 
 def report_from(message: pb.WatchStateResponse) -> RecorderReport:

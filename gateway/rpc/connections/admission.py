@@ -34,9 +34,15 @@ SPARED_S: Final = 1.0
 room for all."""
 PENDING_STREAMS: Final = 4
 """Of one pending connection, of which the health service is all that it can use."""
-METHOD_RATES: Final[Mapping[str, float]] = {"RequestKeyFrame": 3.0, "ReportPicture": 8.0}
-"""Calls a second of methods that reach further than their caller: what one viewer causes, all viewers see.
-The schema documents them."""
+METHOD_RATES: Final[Mapping[str, float]] = {
+    "RequestKeyFrame": 3.0,
+    "ReportPicture": 8.0,
+    "ListRecordings": 20.0,
+    "GetRecording": 20.0,
+    "GetRecordingThumbnail": 20.0,
+}
+"""Calls a second of methods that reach further than their caller: what one viewer causes, all viewers see;
+and the recorder's disk is everyone's. The schema documents them."""
 _REDUCED_BURST_S: Final = 0.01
 """The reduced bucket holds what is refilled in this time."""
 _RETRY_AFTER_S: Final = 1.0

@@ -1,10 +1,11 @@
 """Recordings: passed on to the recorder, which owns them and answers; their copies, to the bridge."""
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from typing import Final
 
 from google.protobuf.message import Message
 
+from common import bridge_run
 from common.errors import NotAllowedError, PreconditionError
 from common.reasons import Reason
 from gateway.access.role import Role
@@ -12,7 +13,7 @@ from gateway.links.bridge.uploads import Uploads
 from gateway.links.recorder.calls import RecorderCalls
 from gateway.rpc.calls.call import CallContext
 from gateway.rpc.mapping.cloud import recording_copy
-from gateway.rpc.responses.export_stream import ExportStream
+from gateway.rpc.responses.export_stream import ExportCaller, ExportStream, Rank
 from gateway.status.cloud import RecordingCopy, RecordingCopyState
 from omniseer.gateway.v1.recording_pb2 import (
     CancelUploadRequest,
@@ -38,12 +39,20 @@ class RecordingService:
         calls: to the recorder; None where the robot is not set up for recording.
         exports: passes the bytes of files on.
         uploads: to the bridge; None where the robot is not set up for a fleet.
+        bridge_run: ID of the bridge's run; empty where no bridge answers.
     """
 
-    def __init__(self, calls: RecorderCalls | None, exports: ExportStream, uploads: Uploads | None) -> None:
+    def __init__(
+        self,
+        calls: RecorderCalls | None,
+        exports: ExportStream,
+        uploads: Uploads | None,
+        bridge_run: Callable[[], str] = str,
+    ) -> None:
         self._calls = calls
         self._exports = exports
         self._uploads = uploads
+        self._bridge_run = bridge_run
 
     async def start_recording(self, request: StartRecordingRequest, call: CallContext) -> bytes:
         """Returns when the first file is open."""
@@ -91,7 +100,8 @@ class RecordingService:
 
     def export_recording(self, request: ExportRecordingRequest, call: CallContext) -> AsyncIterator[bytes]:
         """Yields a header, then the chunks."""
-        return self._exports.responses(self._configured(), request.SerializeToString(), _caller(call))
+        caller = ExportCaller(_caller(call), self._rank(call))
+        return self._exports.responses(self._configured(), request.SerializeToString(), caller)
 
     async def upload_recording(
         self, request: UploadRecordingRequest, call: CallContext
@@ -111,6 +121,12 @@ class RecordingService:
         kept = copy.state is RecordingCopyState.VERIFIED
         what = _where(copy) if kept else "is not copied to the fleet's store any more"
         return CancelUploadResponse(message=f"{request.recording_id} {what}")
+
+    def _rank(self, call: CallContext) -> Rank:
+        if bridge_run.is_of(self._bridge_run(), call.rpc.invocation_metadata() or ()):
+            return Rank.BRIDGE
+        operates = call.principal is None or call.principal.role.may(Role.OPERATOR)
+        return Rank.OPERATOR if operates else Rank.VIEWER
 
     async def _pass_on(self, request: Message, call: CallContext) -> bytes:
         return await self._configured().call(

@@ -109,7 +109,7 @@ async def test_unary_calls_follow_the_login_as_well(tmp_path: Path, monkeypatch:
         return caught.value.reason
 
     async with guarded_gateway(robot):
-        calls = GatewayCalls(GatewaySettings(target=f"127.0.0.1:{robot.port}", login=login))
+        calls = GatewayCalls(GatewaySettings(target=f"127.0.0.1:{robot.port}", login=login), "run")
         try:
             assert await reason(calls) == "RECORDING_NOT_CONFIGURED", "it was let through to the recorder"
             new = robot.admin.rotate("bridge")[1].text()

@@ -1,10 +1,11 @@
-"""Exports over a connection of their own: the recorder's end and the gateway's, over real sockets."""
+"""Files of exports are handed to the gateway: the recorder's end and the gateway's, over real sockets."""
 
 import asyncio
+import fcntl
 import os
 import socket
 from collections.abc import AsyncIterator
-from contextlib import aclosing, asynccontextmanager
+from contextlib import AsyncExitStack, aclosing, asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,19 +19,23 @@ from common.export_connection import (
     CONNECT_WITHIN_S,
     KEY_BYTES,
     KEY_HEADER,
-    LENGTH,
-    MAX_MESSAGE_BYTES,
+    ORDER,
+    TAKEN,
     socket_beside,
 )
+from common.open_file import CHUNK_BYTES, Chunk
+from common.reader_threads import ReaderThreads
 from gateway.links.recorder import wire
-from gateway.links.recorder.export_connection import carried_messages
+from gateway.links.recorder.export_connection import HandedFile, handed_file
 from gateway.links.recorder.wire import RecorderClient, RecorderConnector
+from gateway.rpc.mapping.export import message_parts
 from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.recorder.v1 import recorder_service_pb2_grpc as pb_grpc
 from recorder.rpc.export_connections import MAX_UNKNOWN, ExportConnections
 from recorder.rpc.servicer import RecorderServicer
-from recorder.store.export import CHUNK_BYTES
-from recorder.store.run_bundles import RunBundles
+from recorder.store import sums
+from recorder.store.readers import reader_threads
+from tests.support.descriptors import descriptors_of
 from tests.support.eventually import eventually
 from tests.support.recorder_in_process import Running, Source, running_recorder
 from tests.support.refusals import refused
@@ -39,19 +44,24 @@ MIB = 1024 * 1024
 METADATA = (("x-caller", "ann"),)
 
 
+def as_bytes(response: bytes | Chunk) -> bytes:
+    """What the gateway's caller gets."""
+    return response if isinstance(response, bytes) else b"".join(message_parts(response))
+
+
 @dataclass
 class Robot:
     """A recorder with a finished recording, and the gateway's client of it.
 
     Attributes:
-        carried: keys of the connections that have carried chunks.
+        handed: keys of the connections that have handed a file over.
     """
 
     running: Running
     socket: Path
     client: RecorderClient
     recording: pb.Recording
-    carried: list[bytes]
+    handed: list[bytes]
 
     def request(self, **more: Any) -> bytes:
         name = self.recording.files[0].name
@@ -59,7 +69,7 @@ class Robot:
         return request.SerializeToString()
 
     async def exported(self, **more: Any) -> list[bytes]:
-        return [each async for each in self.client.export(self.request(**more), METADATA)]
+        return [as_bytes(each) async for each in self.client.export(self.request(**more), METADATA)]
 
     async def over_the_call(self, **more: Any) -> list[bytes]:
         """The same without a connection, as a gateway takes it that knows none of this."""
@@ -74,32 +84,35 @@ class Robot:
 
 
 @asynccontextmanager
-async def robot(root: Path, monkeypatch: pytest.MonkeyPatch, size: int = 3 * MIB) -> AsyncIterator[Robot]:
-    carried: list[bytes] = []
+async def robot(
+    root: Path, monkeypatch: pytest.MonkeyPatch, size: int = 3 * MIB, **settings: Any
+) -> AsyncIterator[Robot]:
+    handed: list[bytes] = []
 
-    async def counted(path: Path, key: bytes) -> Any:
-        messages = carried_messages(path, key)
-        async with aclosing(messages):
-            async for each in messages:
-                if key not in carried:
-                    carried.append(key)
-                yield each
+    @asynccontextmanager
+    async def counted(path: Path, key: bytes, threads: ReaderThreads) -> AsyncIterator[HandedFile | None]:
+        async with handed_file(path, key, threads) as file:
+            if file:
+                handed.append(key)
+            yield file
 
-    monkeypatch.setattr(wire, "carried_messages", counted)
+    monkeypatch.setattr(wire, "handed_file", counted)
     address = root / "recorder.sock"
-    async with running_recorder(root / "root") as running:
+    async with running_recorder(root / "root", **settings) as running, AsyncExitStack() as stack:
         server, connections = rpc.new_server(), ExportConnections()
-        bundles = RunBundles(running.settings.run_bundles)
-        RecorderServicer(
-            running.operations, running.readings, bundles, running.settings, connections
-        ).register(server)
+        readers = stack.enter_context(reader_threads())
+        servicer = RecorderServicer(
+            running.operations, running.readings, running.settings, readers, connections
+        )
+        stack.push_async_callback(servicer.close)
+        servicer.register(server)
         bind.bind_unix(server, address)
         await server.start()
         async with connections.listening(address):
             try:
                 made = await recorded(address, running, size)
                 async with RecorderConnector(address).connect() as client:
-                    yield Robot(running, address, client, made, carried)
+                    yield Robot(running, address, client, made, handed)
             finally:
                 await server.stop(None)
     assert not socket_beside(address).exists()
@@ -134,16 +147,16 @@ async def disconnects(peer: socket.socket) -> bool:
 
 
 @pytest.mark.parametrize("offset", [0, 1, CHUNK_BYTES, 1_000_001])
-async def test_the_connection_carries_what_the_call_would(
+async def test_the_gateway_reads_what_the_call_would_carry(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, offset: int
 ) -> None:
     async with robot(tmp_path, monkeypatch) as recorder:
         found = await recorder.exported(offset=offset)
-        assert len(recorder.carried) == 1
+        assert len(recorder.handed) == 1
         assert found == await recorder.over_the_call(offset=offset)
         chunks = [pb.ExportRecordingResponse.FromString(each).chunk for each in found[1:]]
         assert b"".join(each.data for each in chunks) == recorder.path.read_bytes()[offset:]
-        assert len(recorder.carried) == 1
+        assert len(recorder.handed) == 1
 
 
 async def test_exports_at_once_have_a_connection_each(
@@ -153,7 +166,7 @@ async def test_exports_at_once_have_a_connection_each(
         expected = await recorder.over_the_call()
         found = await asyncio.gather(*(recorder.exported() for _ in range(8)))
         assert all(each == expected for each in found)
-        assert len(recorder.carried) == 8
+        assert len(recorder.handed) == 8
 
 
 async def test_chunks_go_over_the_call_where_nothing_listens(
@@ -164,7 +177,7 @@ async def test_chunks_go_over_the_call_where_nothing_listens(
         beside = socket_beside(recorder.socket)
         away = beside.rename(tmp_path / "away")
         assert await recorder.exported() == expected
-        assert recorder.carried == []
+        assert recorder.handed == []
         away.rename(beside)
 
 
@@ -186,7 +199,7 @@ async def test_damage_and_deletion_end_the_call_with_the_reason(
         exported = recorder.client.export(recorder.request(max_bytes_per_s=MIB), METADATA)
         await anext(exported)
         await anext(exported)
-        assert recorder.carried
+        assert recorder.handed
         await recorder.running.operations.delete("1", recorder.recording.id, b"", force=True)
 
         async def rest() -> None:
@@ -202,7 +215,7 @@ async def test_damage_and_deletion_end_the_call_with_the_reason(
 
         async def export() -> None:
             async for each in recorder.client.export(recorder.request(), METADATA):
-                received.append(each)  # noqa: PERF401  # it ends with an error
+                received.append(as_bytes(each))  # noqa: PERF401  # it ends with an error
 
         assert await refused(export()) == (grpc.StatusCode.DATA_LOSS, "RECORDING_DAMAGED")
         assert sum(map(len, received)) < recorder.recording.files[0].size
@@ -231,11 +244,11 @@ async def test_a_gateway_that_does_not_read_makes_the_recorder_wait(
     async with robot(tmp_path, monkeypatch, 16 * MIB) as recorder:
         expected = await recorder.over_the_call()
         async with aclosing(recorder.client.export(recorder.request(), METADATA)) as exported:
-            found = [await anext(exported), await anext(exported)]
+            found = [as_bytes(await anext(exported)), as_bytes(await anext(exported))]
             # Another one is served meanwhile, whole.
             assert await recorder.exported() == expected
             async for each in exported:
-                found.append(each)  # noqa: PERF401  # begun before
+                found.append(as_bytes(each))  # noqa: PERF401  # begun before
         assert found == expected
 
 
@@ -274,28 +287,122 @@ async def test_a_call_with_another_key_gets_its_chunks_at_once(
 
 
 @pytest.mark.parametrize(
-    ("sent", "expected"),
+    "settings", [{}, {"export": {"max_bytes_per_s": MIB}}], ids=["handed over", "over the call"]
+)
+async def test_a_deleted_recording_is_closed_at_both_ends_though_nobody_reads(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, settings: dict[str, Any]
+) -> None:
+    async with (
+        robot(tmp_path, monkeypatch, 16 * MIB, **settings) as recorder,
+        aclosing(recorder.client.export(recorder.request(), METADATA)) as exported,
+    ):
+        await anext(exported)
+        await anext(exported)
+        assert bool(recorder.handed) is not bool(settings), "a limit of all exports is the recorder's to keep"
+        assert descriptors_of(recorder.path)
+        await recorder.running.operations.delete("1", recorder.recording.id, b"", force=True)
+
+        async def found() -> list[int]:
+            return descriptors_of(recorder.path)
+
+        await eventually(found, lambda now: not now, "its blocks are free")
+
+
+async def test_the_descriptor_is_for_reading_this_file_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with (
+        robot(tmp_path, monkeypatch) as recorder,
+        aclosing(recorder.client.export(recorder.request(), METADATA)) as exported,
+    ):
+        await anext(exported)
+        await anext(exported)
+        found = descriptors_of(recorder.path)
+        assert len(found) >= 2, "the recorder's and the gateway's"
+        for each in found:
+            assert fcntl.fcntl(each, fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDONLY
+            assert fcntl.fcntl(each, fcntl.F_GETFD) & fcntl.FD_CLOEXEC
+
+
+@pytest.mark.timed
+async def test_the_gateway_keeps_the_limit_of_an_export(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with robot(tmp_path, monkeypatch, MIB) as recorder:
+        began_s = asyncio.get_running_loop().time()
+        await recorder.exported(max_bytes_per_s=500_000)
+        assert 1.5 < asyncio.get_running_loop().time() - began_s < 4
+        assert recorder.handed
+
+
+async def test_a_second_export_reads_the_file_once_for_both(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with robot(tmp_path, monkeypatch) as recorder:
+        taken: list[int] = []
+        take = sums._take
+
+        def counted(descriptor: int, size: int, begun: Any) -> None:
+            taken.append(size)
+            take(descriptor, size, begun)
+
+        monkeypatch.setattr(sums, "_take", counted)
+        await asyncio.gather(*(recorder.exported() for _ in range(4)))
+        await recorder.exported(offset=MIB)
+        assert sum(taken) == recorder.recording.files[0].size
+
+
+@pytest.mark.parametrize(
+    ("sent", "what"),
     [
-        (b"", []),
-        (LENGTH.pack(3) + b"one" + LENGTH.pack(3) + b"two", [b"one", b"two"]),
-        (LENGTH.pack(3) + b"one" + LENGTH.pack(3) + b"tw", [b"one"]),
-        (LENGTH.pack(3) + b"one" + b"\0", [b"one"]),
-        (LENGTH.pack(MAX_MESSAGE_BYTES + 1) + b"x", []),
-        (LENGTH.pack(2**32 - 1), []),
+        (b"", None),
+        (ORDER.pack(0, 5, 0), None),
+        (ORDER.pack(0, 5, 0)[:-1], "file"),
+        (ORDER.pack(0, 5, 0), "directory"),
+        (ORDER.pack(0, 5, 0), "fifo"),
     ],
 )
-async def test_the_gateway_takes_whole_messages_of_bounded_size_alone(
-    tmp_path: Path, sent: bytes, expected: list[bytes]
-) -> None:
-    path, key = tmp_path / "socket", os.urandom(KEY_BYTES)
-    received: list[bytes] = []
+async def test_the_gateway_takes_files_alone(tmp_path: Path, sent: bytes, what: str | None) -> None:
+    (tmp_path / "file").write_bytes(b"bytes")
+    (tmp_path / "directory").mkdir()
+    os.mkfifo(tmp_path / "fifo")
+    descriptors = [os.open(tmp_path / what, os.O_RDONLY | os.O_NONBLOCK)] if what else []
+    before = psutil.Process().num_fds()
+    received = await handed_by(tmp_path / "socket", sent, descriptors)
+    assert received == (b"", None)
+    assert psutil.Process().num_fds() == before, "a descriptor was kept"
+    for each in descriptors:
+        os.close(each)
 
-    async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        received.append(await reader.readexactly(KEY_BYTES))
-        writer.write(sent)
-        writer.close()
 
-    async with await asyncio.start_unix_server(answer, path):
-        found = [each async for each in carried_messages(path, key)]
-    assert found == expected
-    assert received == [key]
+async def test_the_gateway_reads_the_range_that_it_is_given(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"some bytes of a file")
+    descriptor = os.open(tmp_path / "file", os.O_RDONLY)
+    received = await handed_by(tmp_path / "socket", ORDER.pack(5, 10, 0), [descriptor])
+    assert received == (TAKEN, b"bytes")
+    os.close(descriptor)
+
+
+async def handed_by(path: Path, sent: bytes, descriptors: list[int]) -> tuple[bytes, bytes | None]:
+    """What a recorder that sends this is answered, and what the gateway reads then."""
+    key, loop = os.urandom(KEY_BYTES), asyncio.get_running_loop()
+    threads = ReaderThreads("files", threads=1, most=1)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK) as listener:
+        listener.bind(str(path))
+        listener.listen()
+
+        async def recorder() -> bytes:
+            connected, _ = await loop.sock_accept(listener)
+            with connected:
+                assert await loop.sock_recv(connected, KEY_BYTES) == key
+                if sent:
+                    socket.send_fds(connected, [sent], descriptors)
+                    return await loop.sock_recv(connected, 1)
+                return b""
+
+        answering = asyncio.create_task(recorder())
+        async with handed_file(path, key, threads) as handed:
+            block = await handed.file.block(handed.offset) if handed else None
+        threads.close()
+        data = None if block is None else b"".join(each.data for each in block)
+        return await answering, data

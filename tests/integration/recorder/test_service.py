@@ -2,75 +2,18 @@
 
 import asyncio
 import hashlib
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import google_crc32c
 import grpc
 import pytest
 
-from common import bind, rpc
 from omniseer.gateway.v1 import fault_pb2
 from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
-from omniseer.recorder.v1 import recorder_service_pb2_grpc as pb_grpc
-from recorder.rpc.servicer import RecorderServicer
-from recorder.store.run_bundles import RunBundles
-from tests.support.recorder_in_process import Running, Source, running_recorder
+from tests.support.recorder_in_process import Source
 from tests.support.refusals import refused
-
-KIB = 1024
-
-
-@dataclass
-class Served:
-    """A recorder behind its socket."""
-
-    stub: Any
-    running: Running
-
-    async def recorded(self, size: int = 1000, messages: int = 10) -> pb.Recording:
-        """A finished recording, with its files."""
-        await self.stub.StartRecording(pb.StartRecordingRequest(request_id=f"start {size}", label="a"))
-        Source(self.running.queue).send(messages, size=size // messages)
-        stopped = await self.stub.StopRecording(pb.StopRecordingRequest(request_id=f"stop {size}"))
-        asked = pb.GetRecordingRequest(recording_id=stopped.recording.id)
-        found: pb.Recording = (await self.stub.GetRecording(asked)).recording
-        return found
-
-
-@asynccontextmanager
-async def served(root: Path, **values: Any) -> AsyncIterator[Served]:
-    async with running_recorder(root / "root", **values) as running:
-        server = rpc.new_server()
-        bundles = RunBundles(running.settings.run_bundles)
-        RecorderServicer(running.operations, running.readings, bundles, running.settings).register(server)
-        socket = root / "recorder.sock"
-        bind.bind_unix(server, socket)
-        await server.start()
-        try:
-            async with grpc.aio.insecure_channel(f"unix:{socket}") as channel:
-                yield Served(pb_grpc.RecorderServiceStub(channel), running)
-        finally:
-            await server.stop(None)
-
-
-async def exported(stub: Any, **request: Any) -> tuple[pb.ExportHeader, bytes]:
-    """The header and the bytes of an export, in which every chunk has been checked."""
-    header, content, offset = pb.ExportHeader(), b"", request.get("offset", 0)
-    async for part in stub.ExportRecording(pb.ExportRecordingRequest(**request)):
-        if part.HasField("header"):
-            header = part.header
-            continue
-        chunk = part.chunk
-        assert chunk.offset == offset + len(content)
-        assert 0 < len(chunk.data) <= 256 * KIB
-        assert chunk.crc32c == google_crc32c.value(chunk.data)
-        content += chunk.data
-    return header, content
+from tests.support.served_recorder import exported, served
 
 
 async def test_a_recording_from_start_to_deletion(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from console.client import ExportedRecording, ExportOptions, ExportProgress, GatewayError, Recording
-from console.client.errors import GatewayFailed, NotAllowed, Refused, Unreachable
+from console.client.errors import GatewayFailed, NotAllowed, Overloaded, Refused, Unreachable
 from console.client.results import RecorderState, RecordingThumbnail
 from console.monitor import recordings as module
 from console.monitor.recordings import Asked, Change, ExportState, Recordings
@@ -219,6 +219,11 @@ async def test_a_refused_picture_is_none_and_a_lost_connection_is_no_answer() ->
         now.robot.thumbnail_error = Unreachable("no robot there")
         now.recordings.show_pictures((ENDED,))
         await now.until(lambda: len(now.robot.asked) > 2, "further attempts")
+        busy = Overloaded("it reads for others")
+        busy.reason = "TOO_MANY_REQUESTS"
+        now.robot.thumbnail_error, asked = busy, len(now.robot.asked)
+        await now.until(lambda: len(now.robot.asked) > asked + 1, "further attempts")
+        assert not now.recordings.view().pictures
         refusal = Refused("it has no key frame")
         refusal.reason = "RECORDING_NOT_FOUND"
         now.robot.thumbnail_error = refusal

@@ -10,8 +10,16 @@ from typing import Any
 import google_crc32c
 import pytest
 
-from console.client.exporting import Export, ExportOptions, _Partial
-from console.client.results import ExportChunk, ExportHeader, RecordingFile
+from console.client.errors import GatewayError, Overloaded, Refused
+from console.client.exporting import Export, ExportOptions, ExportProgress, _Partial, once_read
+from console.client.results import (
+    ExportChunk,
+    ExportHeader,
+    Recording,
+    RecordingFile,
+    RecordingKind,
+    RecordingState,
+)
 from tests.support.played_recordings import ENDED
 
 DATA = b"what was recorded"
@@ -90,3 +98,43 @@ async def test_cancelled_it_closes_the_file_only_after_the_write(disk: SlowDisk,
         await export
     assert not disk.closed
     assert (tmp_path / "copy/data/0.mcap.part").read_bytes() == DATA
+
+
+UNREAD = replace(
+    RECORDING,
+    kind=RecordingKind.RUN_BUNDLE,
+    files=(RecordingFile(name="video.ts", size=len(DATA), sha256=b"", final=False),),
+)
+READ = replace(UNREAD, files=RECORDING.files)
+
+
+async def no_pause(_seconds: float) -> None:
+    await asyncio.sleep(0)
+
+
+async def test_an_export_waits_until_the_robot_has_read_a_run_bundle() -> None:
+    answers: list[Recording | GatewayError] = [UNREAD, Overloaded("it reads others"), READ]
+    shown: list[ExportProgress] = []
+
+    async def ask(_recording_id: str) -> Recording:
+        answer = answers.pop(0)
+        if isinstance(answer, GatewayError):
+            raise answer
+        return answer
+
+    assert await once_read(UNREAD, ask, no_pause, ExportOptions(progress=shown.append)) is READ
+    assert answers == []
+    assert {each.waiting for each in shown} == {"the robot reads the files"}
+
+
+async def test_nothing_is_waited_for_that_does_not_come() -> None:
+    async def ask(_recording_id: str) -> Recording:
+        raise Refused("it was deleted")
+
+    running = replace(UNREAD, state=RecordingState.RECORDING)
+    for each in (running, READ, replace(UNREAD, kind=RecordingKind.MANUAL)):
+        assert await once_read(each, ask, no_pause, ExportOptions()) is each
+    with pytest.raises(Refused):
+        await once_read(UNREAD, ask, no_pause, ExportOptions())
+    impatient = ExportOptions(give_up_after_s=-1)
+    assert await once_read(UNREAD, ask, no_pause, impatient) is UNREAD, "the copy has what can be read"

@@ -334,7 +334,9 @@ class RecordingFile(_message.Message):
     sha256: _builtins.bytes
     """SHA-256 of its content, 32 bytes. Empty while it is not final."""
     final: _builtins.bool
-    """Whether it is complete and never changes again. Only such files are exported."""
+    """Whether it is complete and never changes again. Only such files are exported. Of a run bundle not before the robot
+    has read it for its SHA-256, which begins when someone first gets the recording.
+    """
     def __init__(
         self,
         *,
@@ -951,7 +953,7 @@ class ExportRecordingRequest(_message.Message):
     expected_sha256: _builtins.bytes
     """What the caller has begun to receive, 32 bytes. Empty: any."""
     max_bytes_per_s: _builtins.int
-    """At most so many bytes a second. 0: as configured on the robot, whose limit is never exceeded."""
+    """At most so many bytes a second, at least 65536. 0: as configured on the robot, whose limit is never exceeded."""
     def __init__(
         self,
         *,

@@ -151,16 +151,20 @@ class RecordingServiceServicer:
         raise NotImplementedError('Method not implemented!')
 
     def ListRecordings(self, request, context):
-        """The recordings, the newest first, a page at a time, and the state of the recorder.
+        """The recordings, the newest first, a page at a time, and the state of the recorder. A connection may call it 20 times
+        a second.
 
         INVALID_ARGUMENT: a page token that this robot has not issued.
+        RESOURCE_EXHAUSTED: called too often, or the robot reads for too many callers at once.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def GetRecording(self, request, context):
-        """One recording, with its files.
+        """One recording, with its files. A connection may call it 20 times a second.
+
+        RESOURCE_EXHAUSTED: called too often, or the robot reads the files of too many run bundles at once.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -174,16 +178,19 @@ class RecordingServiceServicer:
         FAILED_PRECONDITION: the file is not final yet.
         ABORTED: the file's content is not what expected_sha256 says, or the recording was deleted meanwhile.
         DATA_LOSS: the robot's disk can't read the file, or reads other bytes than were written.
-        RESOURCE_EXHAUSTED: more than 4 exports of a caller, or 8 of all, at once.
+        RESOURCE_EXHAUSTED: more than 4 exports of a caller, or 8 of all, at once; of the 8 one is kept for operators, and
+        one for the robot's bridge. Also, the caller took nothing for 60 s: the next export goes on where it ended. Also,
+        the robot is still reading the file for its SHA-256.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def GetRecordingThumbnail(self, request, context):
-        """A key frame of the recording's video, for a list of recordings.
+        """A key frame of the recording's video, for a list of recordings. A connection may call it 20 times a second.
 
         NOT_FOUND: also, the recording has no video.
+        RESOURCE_EXHAUSTED: called too often, or the robot reads for too many callers at once.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

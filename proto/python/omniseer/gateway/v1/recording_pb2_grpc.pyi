@@ -66,12 +66,17 @@ class RecordingServiceStub:
     RESOURCE_EXHAUSTED: the disk has no room for it, or 16 snapshots are being made.
     """
     ListRecordings: _grpc.UnaryUnaryMultiCallable[_recording_pb2.ListRecordingsRequest, _recording_pb2.ListRecordingsResponse]
-    """The recordings, the newest first, a page at a time, and the state of the recorder.
+    """The recordings, the newest first, a page at a time, and the state of the recorder. A connection may call it 20 times
+    a second.
 
     INVALID_ARGUMENT: a page token that this robot has not issued.
+    RESOURCE_EXHAUSTED: called too often, or the robot reads for too many callers at once.
     """
     GetRecording: _grpc.UnaryUnaryMultiCallable[_recording_pb2.GetRecordingRequest, _recording_pb2.GetRecordingResponse]
-    """One recording, with its files."""
+    """One recording, with its files. A connection may call it 20 times a second.
+
+    RESOURCE_EXHAUSTED: called too often, or the robot reads the files of too many run bundles at once.
+    """
     ExportRecording: _grpc.UnaryStreamMultiCallable[_recording_pb2.ExportRecordingRequest, _recording_pb2.ExportRecordingResponse]
     """Streams one final file of a recording from an offset on: a header, then its bytes in order. A cut download goes
     on at the offset that has been received; expected_sha256 makes sure that it is still the same file.
@@ -80,12 +85,15 @@ class RecordingServiceStub:
     FAILED_PRECONDITION: the file is not final yet.
     ABORTED: the file's content is not what expected_sha256 says, or the recording was deleted meanwhile.
     DATA_LOSS: the robot's disk can't read the file, or reads other bytes than were written.
-    RESOURCE_EXHAUSTED: more than 4 exports of a caller, or 8 of all, at once.
+    RESOURCE_EXHAUSTED: more than 4 exports of a caller, or 8 of all, at once; of the 8 one is kept for operators, and
+    one for the robot's bridge. Also, the caller took nothing for 60 s: the next export goes on where it ended. Also,
+    the robot is still reading the file for its SHA-256.
     """
     GetRecordingThumbnail: _grpc.UnaryUnaryMultiCallable[_recording_pb2.GetRecordingThumbnailRequest, _recording_pb2.GetRecordingThumbnailResponse]
-    """A key frame of the recording's video, for a list of recordings.
+    """A key frame of the recording's video, for a list of recordings. A connection may call it 20 times a second.
 
     NOT_FOUND: also, the recording has no video.
+    RESOURCE_EXHAUSTED: called too often, or the robot reads for too many callers at once.
     """
     PinRecording: _grpc.UnaryUnaryMultiCallable[_recording_pb2.PinRecordingRequest, _recording_pb2.PinRecordingResponse]
     """Pins a recording, so that making room never deletes it; or ends that.
@@ -153,12 +161,17 @@ class RecordingServiceAsyncStub(RecordingServiceStub):
     RESOURCE_EXHAUSTED: the disk has no room for it, or 16 snapshots are being made.
     """
     ListRecordings: _aio.UnaryUnaryMultiCallable[_recording_pb2.ListRecordingsRequest, _recording_pb2.ListRecordingsResponse]  # type: ignore[assignment]
-    """The recordings, the newest first, a page at a time, and the state of the recorder.
+    """The recordings, the newest first, a page at a time, and the state of the recorder. A connection may call it 20 times
+    a second.
 
     INVALID_ARGUMENT: a page token that this robot has not issued.
+    RESOURCE_EXHAUSTED: called too often, or the robot reads for too many callers at once.
     """
     GetRecording: _aio.UnaryUnaryMultiCallable[_recording_pb2.GetRecordingRequest, _recording_pb2.GetRecordingResponse]  # type: ignore[assignment]
-    """One recording, with its files."""
+    """One recording, with its files. A connection may call it 20 times a second.
+
+    RESOURCE_EXHAUSTED: called too often, or the robot reads the files of too many run bundles at once.
+    """
     ExportRecording: _aio.UnaryStreamMultiCallable[_recording_pb2.ExportRecordingRequest, _recording_pb2.ExportRecordingResponse]  # type: ignore[assignment]
     """Streams one final file of a recording from an offset on: a header, then its bytes in order. A cut download goes
     on at the offset that has been received; expected_sha256 makes sure that it is still the same file.
@@ -167,12 +180,15 @@ class RecordingServiceAsyncStub(RecordingServiceStub):
     FAILED_PRECONDITION: the file is not final yet.
     ABORTED: the file's content is not what expected_sha256 says, or the recording was deleted meanwhile.
     DATA_LOSS: the robot's disk can't read the file, or reads other bytes than were written.
-    RESOURCE_EXHAUSTED: more than 4 exports of a caller, or 8 of all, at once.
+    RESOURCE_EXHAUSTED: more than 4 exports of a caller, or 8 of all, at once; of the 8 one is kept for operators, and
+    one for the robot's bridge. Also, the caller took nothing for 60 s: the next export goes on where it ended. Also,
+    the robot is still reading the file for its SHA-256.
     """
     GetRecordingThumbnail: _aio.UnaryUnaryMultiCallable[_recording_pb2.GetRecordingThumbnailRequest, _recording_pb2.GetRecordingThumbnailResponse]  # type: ignore[assignment]
-    """A key frame of the recording's video, for a list of recordings.
+    """A key frame of the recording's video, for a list of recordings. A connection may call it 20 times a second.
 
     NOT_FOUND: also, the recording has no video.
+    RESOURCE_EXHAUSTED: called too often, or the robot reads for too many callers at once.
     """
     PinRecording: _aio.UnaryUnaryMultiCallable[_recording_pb2.PinRecordingRequest, _recording_pb2.PinRecordingResponse]  # type: ignore[assignment]
     """Pins a recording, so that making room never deletes it; or ends that.
@@ -261,9 +277,11 @@ class RecordingServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _recording_pb2.ListRecordingsRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_recording_pb2.ListRecordingsResponse, _abc.Awaitable[_recording_pb2.ListRecordingsResponse]]:
-        """The recordings, the newest first, a page at a time, and the state of the recorder.
+        """The recordings, the newest first, a page at a time, and the state of the recorder. A connection may call it 20 times
+        a second.
 
         INVALID_ARGUMENT: a page token that this robot has not issued.
+        RESOURCE_EXHAUSTED: called too often, or the robot reads for too many callers at once.
         """
 
     @_abc_1.abstractmethod
@@ -272,7 +290,10 @@ class RecordingServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _recording_pb2.GetRecordingRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_recording_pb2.GetRecordingResponse, _abc.Awaitable[_recording_pb2.GetRecordingResponse]]:
-        """One recording, with its files."""
+        """One recording, with its files. A connection may call it 20 times a second.
+
+        RESOURCE_EXHAUSTED: called too often, or the robot reads the files of too many run bundles at once.
+        """
 
     @_abc_1.abstractmethod
     def ExportRecording(
@@ -287,7 +308,9 @@ class RecordingServiceServicer(metaclass=_abc_1.ABCMeta):
         FAILED_PRECONDITION: the file is not final yet.
         ABORTED: the file's content is not what expected_sha256 says, or the recording was deleted meanwhile.
         DATA_LOSS: the robot's disk can't read the file, or reads other bytes than were written.
-        RESOURCE_EXHAUSTED: more than 4 exports of a caller, or 8 of all, at once.
+        RESOURCE_EXHAUSTED: more than 4 exports of a caller, or 8 of all, at once; of the 8 one is kept for operators, and
+        one for the robot's bridge. Also, the caller took nothing for 60 s: the next export goes on where it ended. Also,
+        the robot is still reading the file for its SHA-256.
         """
 
     @_abc_1.abstractmethod
@@ -296,9 +319,10 @@ class RecordingServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _recording_pb2.GetRecordingThumbnailRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_recording_pb2.GetRecordingThumbnailResponse, _abc.Awaitable[_recording_pb2.GetRecordingThumbnailResponse]]:
-        """A key frame of the recording's video, for a list of recordings.
+        """A key frame of the recording's video, for a list of recordings. A connection may call it 20 times a second.
 
         NOT_FOUND: also, the recording has no video.
+        RESOURCE_EXHAUSTED: called too often, or the robot reads for too many callers at once.
         """
 
     @_abc_1.abstractmethod

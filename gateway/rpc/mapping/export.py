@@ -2,8 +2,8 @@
 
 from typing import Final
 
+from common.open_file import Chunk
 from omniseer.gateway.v1 import recording_pb2 as pb
-from recorder.store.export import Chunk
 
 _LENGTH_DELIMITED: Final = 2
 """Wire type of messages and bytes (protobuf.dev/programming-guides/encoding)."""

@@ -2,11 +2,13 @@
 
 import pytest
 
-from common.export_connection import MAX_MESSAGE_BYTES
+from common.open_file import CHUNK_BYTES, Chunk
+from gateway.rpc.mapping.export import message_parts
 from omniseer.gateway.v1 import recording_pb2 as pb
 from recorder.rpc import mapping
-from recorder.rpc.export_message import message_parts
-from recorder.store.export import CHUNK_BYTES, Chunk
+
+MAX_MESSAGE_BYTES = 256 * 1024 + 64
+"""A chunk, with what frames it in its message."""
 
 
 @pytest.mark.parametrize("offset", [0, 1, 127, 128, 2**32, 2**64 - 1])

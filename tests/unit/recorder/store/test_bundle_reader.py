@@ -1,0 +1,104 @@
+"""Lists of run bundles are read once for all who ask, and files in the background, a few bundles at once."""
+
+import asyncio
+import hashlib
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from common.errors import TooMuchError
+from recorder.store import bundle_reader
+from recorder.store.bundle_reader import LISTED_ANEW_S, MOST_AT_ONCE, BundleReader
+from recorder.store.readers import reader_threads
+from recorder.store.run_bundles import Bundle, RunBundles
+from recorder.store.sums import Sums
+from tests.support.clock import Clock
+from tests.support.eventually import eventually
+
+MIB = 1024 * 1024
+DATA = b"x" * (2 * MIB + 5)
+
+
+class CountedBundles(RunBundles):
+    lists = 0
+
+    def all(self) -> list[Bundle]:
+        self.lists += 1
+        return super().all()
+
+
+@dataclass
+class Ground:
+    reader: BundleReader
+    bundles: CountedBundles
+    clock: Clock
+
+    async def bundle(self, name: str) -> Bundle:
+        found = await self.reader.get(f"run-{name}")
+        assert found
+        return found
+
+
+def add(folder: Path, data: bytes = DATA) -> None:
+    folder.mkdir()
+    (folder / "manifest.yaml").write_text("state: complete\n", encoding="utf-8")
+    (folder / "video.ts").write_bytes(data)
+
+
+@pytest.fixture
+async def ground(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Ground]:
+    """A robot that takes half a second for the files of a bundle, and answers before."""
+    monkeypatch.setattr(bundle_reader, "ANSWER_WITHIN_S", 0.05)
+    for number in range(MOST_AT_ONCE + 1):
+        add(tmp_path / str(number))
+    bundles, clock = CountedBundles((tmp_path,)), Clock()
+    with reader_threads() as readers:
+        sums = Sums(readers.files, max_bytes_per_s=4 * MIB)
+        reader = BundleReader(bundles, readers.looks, sums, clock)
+        yield Ground(reader, bundles, clock)
+        await reader.close()
+
+
+async def test_many_who_list_at_once_have_the_folders_read_once(ground: Ground) -> None:
+    for listed in await asyncio.gather(*(ground.reader.all() for _ in range(20))):
+        assert len(listed) == MOST_AT_ONCE + 1
+    assert ground.bundles.lists == 1
+    ground.clock.now_s += LISTED_ANEW_S + 0.1
+    await ground.reader.all()
+    assert ground.bundles.lists == 2
+
+
+async def test_who_asks_again_gets_what_was_read_meanwhile(ground: Ground) -> None:
+    bundle = await ground.bundle("0")
+    assert "video.ts" not in await ground.reader.sums(bundle)
+
+    async def sums() -> dict[str, bytes]:
+        return await ground.reader.sums(bundle)
+
+    found = await eventually(sums, lambda now: len(now) == 2, "all files are read")
+    assert found["video.ts"] == hashlib.sha256(DATA).digest()
+    assert await ground.reader.sha256(bundle, bundle.files[1]) == found["video.ts"]
+
+
+async def test_more_bundles_than_permitted_are_refused_until_one_is_read(ground: Ground) -> None:
+    for number in range(MOST_AT_ONCE):
+        await ground.reader.sums(await ground.bundle(str(number)))
+    last = await ground.bundle(str(MOST_AT_ONCE))
+    with pytest.raises(TooMuchError, match="try again later"):
+        await ground.reader.sums(last)
+
+    async def admitted() -> bool:
+        try:
+            await ground.reader.sums(last)
+        except TooMuchError:
+            return False
+        return True
+
+    await eventually(admitted, bool, "one of the others is read", 20)
+
+
+async def test_unknown_names_are_no_bundles(ground: Ground) -> None:
+    for name in ("run-none", "none", "", "../0", "run-../0"):
+        assert await ground.reader.get(name) is None
