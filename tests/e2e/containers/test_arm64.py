@@ -109,6 +109,8 @@ def preview(directory: Path, port: int) -> Iterator[str]:
     try:
         yield name
     finally:
+        # Shown if the test fails.
+        subprocess.run(["docker", "logs", name], check=False)
         run("docker", "rm", "--force", name)
 
 
