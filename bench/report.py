@@ -6,8 +6,9 @@ from typing import Final
 
 from rich.table import Table
 
+from bench.catalogue import NAMES
 from bench.remarks import REMARKS
-from bench.results import ROOT, Run
+from bench.results import ROOT, Conditions, Run
 from bench.rows import Row
 
 PAGE: Final = ROOT / "docs" / "benchmarks.md"
@@ -23,6 +24,15 @@ reference, both do the same work in the same rounds, in turns or at once, and th
 two; else it is on the value itself. A row without a bar is published for comparison and promises nothing.
 Spread is the lowest and the highest round of the figure that is judged. Rounds that were measured and left
 out, because they were not comparable, are counted behind a plus sign."""
+_NOTHING: Final = """\
+
+No figure is published yet that was measured as the benchmarks measure today."""
+_NOT_PUBLISHED: Final = """\
+
+## Not published
+
+These rows exist and have no published figure:
+"""
 
 
 def table(rows: Sequence[Row]) -> Table:
@@ -33,12 +43,31 @@ def table(rows: Sequence[Row]) -> Table:
     return made
 
 
+def summary(row: Row) -> str:
+    """Returns a row in a few words, for the log."""
+    ratio = "" if row.ratio is None else f", {row.ratio:.3f} of the reference"
+    bar = "" if row.bar is None else f"; promised {_bar(row)}: {_kept(row)}"
+    return f"{_value(row)}{ratio}{bar}"
+
+
 def page(runs: Sequence[Run]) -> str:
     """Returns the published runs as Markdown, with the remarks on their rows."""
     names = [row.name for run in runs for row in run.rows]
-    remarks = [f"- {', '.join(f'`{name}`' for name in about)}: {text}" for about, text in REMARKS.items()]
-    kept = [remark for remark, about in zip(remarks, REMARKS, strict=True) if set(about) & set(names)]
-    lines = [_INTRODUCTION, *(line for run in runs for line in _section(run)), "", "## Remarks", "", *kept]
+    lines = [_INTRODUCTION]
+    if not runs:
+        lines.append(_NOTHING)
+    for run in runs:
+        lines += _section(run)
+    remarks = [
+        f"- {', '.join(f'`{name}`' for name in about)}: {text}"
+        for about, text in REMARKS.items()
+        if set(about) & set(names)
+    ]
+    if remarks:
+        lines += ["", "## Remarks", "", *remarks]
+    lacking = [f"`{name}`" for name in NAMES if name not in names]
+    if lacking:
+        lines += [_NOT_PUBLISHED, ", ".join(lacking)]
     return "\n".join(lines) + "\n"
 
 
@@ -48,12 +77,11 @@ def write_page(runs: Sequence[Run], file: Path = PAGE) -> None:
 
 
 def _section(run: Run) -> list[str]:
-    on = run.on
     return [
         "",
-        f"## {on['date']}, commit {on['commit']}",
+        f"## {run.on.date}, commit {run.on.commit}",
         "",
-        f"{on['machine']}, {on['system']}, Python {on['python']}.",
+        _conditions(run.on),
         "",
         "| " + " | ".join(_COLUMNS) + " |",
         "|" + "---|" * len(_COLUMNS),
@@ -61,19 +89,36 @@ def _section(run: Run) -> list[str]:
     ]
 
 
+def _conditions(on: Conditions) -> str:
+    machine = f"{on.machine}, {on.system}, Python {on.python}."
+    if on.busy_percent is None:
+        return machine
+    waited = f"In the seconds before a measurement, programs waited for a processor {on.busy_percent:g} %"
+    return f"{machine} {waited} of the time at most."
+
+
 def _cells(row: Row) -> tuple[str, ...]:
     low, high = row.spread
     return (
         row.name,
         row.what + (" (worst round)" if row.judged == "worst" else ""),
-        f"{row.value:.4g} {row.unit}".rstrip(),
+        _value(row),
         "" if row.reference is None else f"{row.reference:.4g} {row.unit}".rstrip(),
         "" if row.ratio is None else f"{row.ratio:.3f}",
         f"{low:.4g} to {high:.4g}",
         _bar(row),
         f"{len(row.values)}" + (f" + {row.discarded}" if row.discarded else ""),
-        "" if row.bar is None else "yes" if row.ok else "NO",
+        _kept(row),
     )
+
+
+def _value(row: Row) -> str:
+    value = f"{row.value:.4g} {row.unit}".rstrip()
+    return f"{value} (median {row.median:.4g})" if row.judged == "worst" else value
+
+
+def _kept(row: Row) -> str:
+    return "" if row.bar is None else "yes" if row.ok else "NO"
 
 
 def _bar(row: Row) -> str:

@@ -58,8 +58,13 @@ class Row:
     def value(self) -> float:
         """Median or worst round of ours."""
         if self.judged == "median":
-            return statistics.median(self.values)
+            return self.median
         return max(self.values) if self.better == "lower" else min(self.values)
+
+    @property
+    def median(self) -> float:
+        """Median round of ours, however the row is judged."""
+        return statistics.median(self.values)
 
     @property
     def reference(self) -> float | None:
@@ -102,7 +107,8 @@ class Row:
         written = {name: getattr(self, name) for name in self.__slots__}
         written["values"] = [_rounded(value) for value in self.values]
         written["references"] = [_rounded(value) for value in self.references]
-        derived = {"value": self.value, "reference": self.reference, "ratio": self.ratio}
+        names = ("value", "median", "reference", "ratio")
+        derived = {name: getattr(self, name) for name in names}
         return (
             written
             | {name: None if figure is None else _rounded(figure) for name, figure in derived.items()}
