@@ -7,6 +7,9 @@ import pytest
 
 from bench.video import camera_switching, latency, product, switching
 from bench.video.camera import Camera, camera
+from bench.video.far_viewing import FarWatch, watch_far
+from bench.video.window import Glance
+from tests.support.udp_link import Impairment
 
 pytestmark = pytest.mark.gst
 
@@ -43,3 +46,31 @@ def test_a_round_of_cameras(source: Camera, tmp_path: Path) -> None:
         assert robot.client.status().preview.wanted_camera == "front"
     # At 30 frames per second no gap is shorter than 33 ms.
     assert longest_ms > 30
+
+
+def test_a_watch_over_a_narrow_link(source: Camera, tmp_path: Path) -> None:
+    narrow = Impairment(delay_s=0.01, rate_kbps=1500, queue_s=2.0)
+    with product.robot(tmp_path, source, latency.LATENCY_MS, far=True) as robot:
+        found = watch_far(source, robot, narrow, settle_s=0.0, watch_s=2.0)
+    # A frame is no younger than the link is long, and a picture is on the screen until the next one comes.
+    assert found.glass().worst_ms >= found.glass().p95_ms > 10
+    assert found.glass().worst_ms > max(one.latency_ms for one in found.window.glances)
+
+
+def far_watch(*seen: Glance) -> FarWatch:
+    return FarWatch(seen, 1.0, 13.0, 360, 0.0, 0, {}, 0, "")
+
+
+def test_the_age_over_a_link_begins_with_the_first_frame() -> None:
+    late = far_watch(Glance(4.9, 5.0), Glance(8.9, 9.0))
+    assert late.first_s == 5.0
+    assert late.glass().worst_ms == pytest.approx(4100)
+    assert late.glass(6.0).worst_ms == pytest.approx(4100)
+    assert late.glass(6.0).p95_ms == pytest.approx(4100 - 0.05 * 2000)
+
+
+@pytest.mark.parametrize("seen", [(), (Glance(12.8, 12.9),), (Glance(12.9, 13.1),)])
+def test_a_link_that_delivers_next_to_nothing_has_an_age(seen: tuple[Glance, ...]) -> None:
+    watch = far_watch(*seen)
+    assert watch.glass().worst_ms > 0
+    assert watch.glass(3.0).p95_ms > 0
