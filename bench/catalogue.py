@@ -104,6 +104,7 @@ PARTS: Final = (
         "bench.video.age_lossy", 6, tuple(f"video.age_{link}{figure}" for link in _LINKS for figure in _AGES)
     ),
     Part("bench.video.age_narrow", 3, tuple(f"video.age_narrow{figure}" for figure in _OVER_NARROW)),
+    Part("bench.video.age_narrow", 3, tuple(f"video.age_deep{figure}" for figure in _OVER_NARROW)),
     Part("bench.video.age_narrow", 3, ("video.age_changing_freeze_ms", "video.age_changing_reconnects")),
     Part("bench.video.viewer_cpu", 3, ("video.viewer_cpu",)),
     Part("bench.video.h265", 1, ("video.excess_h265_ms",)),

@@ -60,7 +60,10 @@ class _Kind:
 KINDS: Final = (
     _Kind("video.age_narrow", 0.2, adaptive=True, worst_ms=800, p95_ms=300),
     _Kind("video.age_narrow_fixed", 0.2, adaptive=False, worst_ms=1000),
+    _Kind("video.age_deep", 2.0, adaptive=True, worst_ms=800, p95_ms=300),
+    _Kind("video.age_deep_fixed", 2.0, adaptive=False, worst_ms=1000),
 )
+"""What a shallow queue has no room for is lost; in a deep one, as mobile networks have, it waits."""
 _FIGURES: Final = ("p95_ms", "worst_ms", "freeze_ms", "torn")
 _CHANGING: Final = "video.age_changing"
 
