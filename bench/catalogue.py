@@ -56,7 +56,16 @@ _ADAPTIVE: Final = tuple(
 )
 _DARK: Final = tuple(
     f"video.dark_ms_{failure}"
-    for failure in ("error", "no_output", "empty", "hang", "crash", "profile_change", "key_frame")
+    for failure in (
+        "error",
+        "no_output",
+        "empty",
+        "hang",
+        "crash",
+        "profile_change",
+        "key_frame",
+        "bit_rate",
+    )
 )
 _STOPS: Final = tuple(
     f"drive.stop_{fault}_ms"
@@ -91,7 +100,7 @@ PARTS: Final = (
     Part("bench.video.switching", 1, ("video.switch_gap_ms",)),
     Part("bench.video.camera_switching", 2, ("video.camera_switch_gap_ms", "video.camera_against_profile")),
     Part("bench.video.adaptive", 12, _ADAPTIVE),
-    Part("bench.video.dark", 7, _DARK),
+    Part("bench.video.dark", 9, _DARK),
     Part(
         "bench.video.age_default",
         3,
