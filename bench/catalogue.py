@@ -93,7 +93,11 @@ PARTS: Final = (
     Part("bench.idle", 4, ("idle.cpu", "idle.rss_mib", "idle.cpu_after", "idle.rss_after_mib")),
     Part("bench.cli", 1, ("cli.start_ms", "cli.status_ms")),
     Part("bench.video.latency", 5, _CELLS),
-    Part("bench.video.joining", 5, ("video.first_frame", "video.first_frame_ms")),
+    Part(
+        "bench.video.joining",
+        6,
+        ("video.first_frame", "video.first_frame_ms", "video.first_frame_srt_ms"),
+    ),
     Part("bench.video.joining_together", 1, ("video.first_frame_ten_ms",)),
     Part("bench.video.enabling", 2, ("video.enable_to_frame_ms", "video.cold_enable_ms")),
     Part("bench.video.cpu", 5, ("video.cpu", "video.cpu_in_turns")),
@@ -200,6 +204,7 @@ def rows_of(names: Collection[str], ground: Any) -> list[Row]:
         for part in PARTS
         if (wanted := set(names) & set(part.names))
         for row in importlib.import_module(part.module).rows(ground, wanted)
+        if row.name in wanted
     ]
 
 
