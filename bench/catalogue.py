@@ -98,7 +98,7 @@ PARTS: Final = (
         6,
         ("video.first_frame", "video.first_frame_ms", "video.first_frame_srt_ms"),
     ),
-    Part("bench.video.joining_together", 1, ("video.first_frame_ten_ms",)),
+    Part("bench.video.joining_together", 1, ("video.first_frame_ten_ms", "video.first_frame_ten_key_frames")),
     Part("bench.video.enabling", 2, ("video.enable_to_frame_ms", "video.cold_enable_ms")),
     Part("bench.video.cpu", 5, ("video.cpu", "video.cpu_in_turns")),
     Part("bench.video.switching", 1, ("video.switch_gap_ms",)),

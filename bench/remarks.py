@@ -21,7 +21,7 @@ REMARKS: Final[Mapping[tuple[str, ...], str]] = {
         "the reference waits for its next key frame, one a second, so its single waits are spread over more"
         " than a second. Both are connected to at moments spread evenly over that second."
     ),
-    ("video.first_frame_ten_ms",): (
+    ("video.first_frame_ten_ms", "video.first_frame_ten_key_frames"): (
         "srtsink listens with a backlog of 1, so some of ten simultaneous SRT handshakes are refused; these"
         " viewers redial after 100 ms, and the slowest shows it."
     ),

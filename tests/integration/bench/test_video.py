@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.video import camera_switching, latency, product, switching
+from bench.video import camera_switching, joining_together, latency, product, switching
 from bench.video.camera import Camera, camera
 from bench.video.far_viewing import FarWatch, watch_far
 from bench.video.window import Glance
@@ -46,6 +46,13 @@ def test_a_round_of_cameras(source: Camera, tmp_path: Path) -> None:
         assert robot.client.status().preview.wanted_camera == "front"
     # At 30 frames per second no gap is shorter than 33 ms.
     assert longest_ms > 30
+
+
+def test_a_round_of_viewers_that_join_at_once(source: Camera, tmp_path: Path) -> None:
+    with product.robot(tmp_path, source, latency.LATENCY_MS, settings=joining_together.SETTINGS) as robot:
+        found = joining_together.one_round(robot, viewers=3)
+    assert found.slowest_ms > 0
+    assert 1 <= found.key_frames <= 3
 
 
 def test_a_watch_over_a_narrow_link(source: Camera, tmp_path: Path) -> None:
