@@ -2,13 +2,19 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from bench.video import camera_switching, joining_together, latency, product, switching
+from bench.video import camera_switching, joining_together, latency, product, reference, switching
 from bench.video.camera import Camera, camera
 from bench.video.far_viewing import FarWatch, watch_far
 from bench.video.window import Glance
+from common.gst import Gst
+from preview.config import PreviewSettings
+from preview.encoders.catalogue import CATALOGUE
+from preview.encoders.properties import configure
+from preview.values import Profile
 from tests.support.udp_link import Impairment
 
 pytestmark = pytest.mark.gst
@@ -81,3 +87,23 @@ def test_a_link_that_delivers_next_to_nothing_has_an_age(seen: tuple[Glance, ...
     watch = far_watch(*seen)
     assert watch.glass().worst_ms > 0
     assert watch.glass(3.0).p95_ms > 0
+
+
+def test_the_reference_encodes_as_the_preview_does() -> None:
+    settings = PreviewSettings()
+    target = settings.profiles.targets[Profile.BALANCED]
+    gop_frames = round(settings.encoders.key_frame_interval_s * target.fps)
+    ours = Gst.ElementFactory.make("x264enc")
+    configure(ours, CATALOGUE["x264"], target.bitrate_kbps, gop_frames, target.bitrate_kbps)
+    theirs = Gst.parse_launch(reference.same_encoder())
+    assert properties(theirs) == properties(ours)
+    plain = Gst.parse_launch(reference.PLAIN_X264)
+    assert properties(plain) != properties(ours), "nothing is compared"
+
+
+def properties(element: Any) -> dict[str, Any]:
+    return {
+        each.name: element.get_property(each.name)
+        for each in element.list_properties()
+        if each.name not in {"name", "parent"}
+    }
