@@ -49,6 +49,11 @@ _CELLS: Final = tuple(
     for receiver in ("plain", "ours")
     for figure in ("ms", "p99_ms", "delivered_percent")
 )
+_PEERS: Final = tuple(
+    f"video.peer_{peer}_{figure}"
+    for peer in ("ours", "rtp", "webrtc")
+    for figure in ("ms", "p99_ms", "delivered_percent")
+)
 _ADAPTIVE: Final = tuple(
     f"video.adaptive_{link}{figure}"
     for link in ("limited", "lossy")
@@ -121,7 +126,7 @@ PARTS: Final = (
     Part("bench.video.age_narrow", 3, ("video.age_changing_freeze_ms", "video.age_changing_reconnects")),
     Part("bench.video.viewer_cpu", 3, ("video.viewer_cpu",)),
     Part("bench.video.h265", 1, ("video.excess_h265_ms",)),
-    Part("bench.video.peers", 2, ("video.peer_rtp_ms", "video.peer_webrtc_ms")),
+    Part("bench.video.peers", 4, _PEERS),
     Part("bench.viewer", 1, ("viewer.extra_latency_frames",)),
     Part("bench.monitor", 1, ("monitor.loop_delay_p99_ms",)),
     Part("bench.monitor", 1, ("monitor.loop_delay_p99_full_ms",)),

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from bench.video import camera_switching, joining_together, latency, product, reference, switching
+from bench.video import camera_switching, joining_together, latency, peers, product, reference, switching
 from bench.video.camera import Camera, camera
 from bench.video.far_viewing import FarWatch, watch_far
 from bench.video.window import Glance
@@ -36,6 +36,13 @@ def robot(source: Camera, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
 def test_a_cell_of_the_latency(source: Camera, robot: product.Robot, ours: bool) -> None:
     found = latency.measure(latency.Cell(ours, ours), source, robot, settle_s=0.5, watch_s=1.0)
     # Less than the SRT latency is impossible: the stamp or a clock would be wrong.
+    assert 0 < found.median_ms <= found.p99_ms
+    assert 0 < found.delivered_percent <= 100
+
+
+@pytest.mark.parametrize("name", peers.PEERS)
+def test_a_round_of_a_peer(source: Camera, robot: product.Robot, name: str) -> None:
+    found = peers.one_round(name, source, robot, settle_s=0.5, watch_s=1.0)
     assert 0 < found.median_ms <= found.p99_ms
     assert 0 < found.delivered_percent <= 100
 
