@@ -125,7 +125,7 @@ PARTS: Final = (
     Part("bench.video.age_narrow", 3, tuple(f"video.age_deep{figure}" for figure in _OVER_NARROW)),
     Part("bench.video.age_narrow", 3, ("video.age_changing_freeze_ms", "video.age_changing_reconnects")),
     Part("bench.video.viewer_cpu", 3, ("video.viewer_cpu",)),
-    Part("bench.video.h265", 1, ("video.excess_h265_ms",)),
+    Part("bench.video.h265", 1, ("video.excess_h265_ms", "video.excess_h265_delivered_percent")),
     Part("bench.video.peers", 4, _PEERS),
     Part("bench.viewer", 1, ("viewer.extra_latency_frames",)),
     Part("bench.monitor", 1, ("monitor.loop_delay_p99_ms",)),
