@@ -6,7 +6,16 @@ from typing import Any
 
 import pytest
 
-from bench.video import camera_switching, joining_together, latency, peers, product, reference, switching
+from bench.video import (
+    camera_switching,
+    joining_together,
+    latency,
+    peers,
+    product,
+    receiver_cpu,
+    reference,
+    switching,
+)
 from bench.video.camera import Camera, camera
 from bench.video.far_viewing import FarWatch, watch_far
 from bench.video.window import Glance
@@ -45,6 +54,14 @@ def test_a_round_of_a_peer(source: Camera, robot: product.Robot, name: str) -> N
     found = peers.one_round(name, source, robot, settle_s=0.5, watch_s=1.0)
     assert 0 < found.median_ms <= found.p99_ms
     assert 0 < found.delivered_percent <= 100
+
+
+def test_a_round_of_the_viewers_cpu(robot: product.Robot) -> None:
+    with robot.preview():
+        found = receiver_cpu.one_round(robot.client.target, settle_s=2.0, watch_s=1.0)
+    for each in found:
+        assert each.ms_per_frame > 0
+        assert 1 < each.fps < 40
 
 
 def test_a_round_of_switches(robot: product.Robot) -> None:
