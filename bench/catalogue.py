@@ -135,7 +135,7 @@ PARTS: Final = (
     Part("bench.drive.cpu", 2, ("drive.cpu", "drive.cpu_idle")),
     Part(
         "bench.drive.losses",
-        14,
+        21,
         ("drive.false_stops", "drive.false_stops_one_lane", "drive.command_p99_ms"),
     ),
     Part("bench.drive.losses", 11, ("drive.false_stops_very_lossy",)),
