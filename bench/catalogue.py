@@ -92,6 +92,7 @@ PARTS: Final = (
     Part("bench.status", 1, ("status.throughput", "status.cpu_per_call")),
     Part("bench.status", 1, ("status.tls",)),
     Part("bench.status", 2, ("status.p99",)),
+    Part("bench.status", 3, ("status.cpu_per_call_real",)),
     Part("bench.watch", 2, ("watch.cpu_100", "watch.served_100")),
     Part("bench.watch", 2, ("watch.p99_healthy",)),
     Part("bench.events", 1, ("events.p99_ms",)),

@@ -89,6 +89,7 @@ def test_what_fails_keeps_nothing_else_from_being_measured_and_fails_the_run(
         "status.throughput",
         "status.cpu_per_call",
         "status.p99",
+        "status.cpu_per_call_real",
         "watch.served_100",
         "watch.p99_healthy",
     ]
@@ -105,7 +106,7 @@ def test_missing_leaves_out_what_is_published_of_this_commit(bench: Bench) -> No
     assert bench.asked == []
     bench.on = replace(HERE, commit="d")
     assert bench("status", "--missing") == 0
-    assert len(bench.asked) == 3
+    assert len(bench.asked) == 4
 
 
 def test_how_long_it_will_take_is_said(bench: Bench, capsys: pytest.CaptureFixture[str]) -> None:
