@@ -144,7 +144,7 @@ PARTS: Final = (
     Part("bench.rec.losing", 6, ("rec.lost_40", "rec.lost_40_miscounted")),
     Part("bench.rec.losing", 2, ("rec.lost_stalled_miscounted",)),
     Part("bench.rec.cpu", 5, ("rec.cpu", "rec.idle_cpu", "rec.ring_cpu")),
-    Part("bench.rec.video", 4, ("rec.preview_tap", "rec.stamps")),
+    Part("bench.rec.video", 4, ("rec.preview_tap", "rec.stamps", "rec.stamps_worst")),
     Part("bench.rec.killing", 2, ("rec.kill_loss_ms",)),
     Part("bench.rec.recovering", 1, ("rec.recovery_mib_s",)),
     Part("bench.rec.snapshots", 3, ("rec.snapshot_ms", "rec.snapshot_disk")),
