@@ -77,9 +77,14 @@ _STOPS: Final = tuple(
     for fault in (
         "release",
         "client_killed",
+        "client_frozen",
         "cable_cut",
+        "lanes_silent",
+        "downlink",
         "gateway_killed",
         "gateway_frozen",
+        "worker_killed",
+        "worker_frozen",
         "viewer",
         "viewer_lossy",
     )
@@ -131,7 +136,7 @@ PARTS: Final = (
     Part("bench.viewer", 1, ("viewer.extra_latency_frames",)),
     Part("bench.monitor", 1, ("monitor.loop_delay_p99_ms",)),
     Part("bench.monitor", 1, ("monitor.loop_delay_p99_full_ms",)),
-    Part("bench.drive.stopping", 5, _STOPS),
+    Part("bench.drive.stopping", 8, _STOPS),
     Part("bench.drive.thawing", 2, ("drive.thawed_ms",)),
     Part("bench.drive.cpu", 2, ("drive.cpu", "drive.cpu_idle")),
     Part(

@@ -17,8 +17,15 @@ def ground(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ground]:
         yield running
 
 
-def test_a_round_of_a_fault(ground: Ground) -> None:
-    assert 0 < stopping.stopped_ms(ground, stopping.FAULTS["gateway_killed"]) < 1000
+@pytest.mark.parametrize("fault", ["gateway_killed", "client_frozen", "lanes_silent", "worker_killed"])
+def test_a_round_of_a_fault(ground: Ground, fault: str) -> None:
+    assert 0 < stopping.stopped_ms(ground, stopping.FAULTS[fault]) < 1000
+
+
+@needs_tun
+@pytest.mark.parametrize("fault", ["cable_cut", "downlink"])
+def test_a_round_of_a_fault_of_a_link(ground: Ground, fault: str) -> None:
+    assert 0 < stopping.stopped_ms(ground, stopping.FAULTS[fault]) < 1000
 
 
 def test_a_round_of_stops_under_siege(ground: Ground) -> None:
