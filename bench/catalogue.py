@@ -136,7 +136,8 @@ PARTS: Final = (
     Part("bench.viewer", 1, ("viewer.extra_latency_frames",)),
     Part("bench.monitor", 1, ("monitor.loop_delay_p99_ms",)),
     Part("bench.monitor", 1, ("monitor.loop_delay_p99_full_ms",)),
-    Part("bench.drive.stopping", 8, _STOPS),
+    Part("bench.drive.stopping", 14, _STOPS),
+    Part("bench.drive.revoking", 2, ("drive.stop_revoked_ms",)),
     Part("bench.drive.thawing", 2, ("drive.thawed_ms",)),
     Part("bench.drive.cpu", 2, ("drive.cpu", "drive.cpu_idle")),
     Part(

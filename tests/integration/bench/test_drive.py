@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from bench.drive import cpu, losses, stopping, thawing
+from bench.drive import cpu, losses, revoking, stopping, thawing
 from bench.drive.ground import Ground, driven_ground, driver
 from tests.support.tcp_link import needs_tun
 
@@ -30,6 +30,10 @@ def test_a_round_of_a_fault_of_a_link(ground: Ground, fault: str) -> None:
 
 def test_a_round_of_stops_under_siege(ground: Ground) -> None:
     assert stopping.viewer_ms(ground, stops=5, watchers=10) > 0
+
+
+def test_a_round_of_a_revocation(ground: Ground) -> None:
+    assert 0 < revoking.moved_ms(ground) < 3000
 
 
 def test_a_round_of_freezing(ground: Ground) -> None:
