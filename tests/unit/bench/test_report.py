@@ -13,7 +13,8 @@ ON = Conditions(machine="m", system="s", python="3", commit="c", date="2026-01-0
 
 
 def row(**changed: Any) -> Row:
-    return Row(**({"name": "a.one", "what": "w", "unit": "ms", "values": [1.0] * 5, "bar": 2} | changed))
+    fields: dict[str, Any] = {"name": "a.one", "what": "w", "unit": "ms", "values": [1.0] * 5, "bar": 2}
+    return Row(**(fields | changed))
 
 
 def cells(shown: Row) -> list[str]:

@@ -3,6 +3,7 @@
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -47,7 +48,7 @@ def test_the_dates_of_three_days_are_the_first_and_the_last() -> None:
 
 
 @pytest.mark.parametrize("changed", [{"machine": "n"}, {"commit": "d"}, {"python": "4"}])
-def test_another_machine_or_commit_is_another_run(changed: dict[str, str]) -> None:
+def test_another_machine_or_commit_is_another_run(changed: dict[str, Any]) -> None:
     assert len(merged([run("a.one")], run("a.two", on=replace(ON, **changed)), ORDER)) == 2
 
 
