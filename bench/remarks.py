@@ -4,17 +4,33 @@ from collections.abc import Mapping
 from typing import Final
 
 REMARKS: Final[Mapping[tuple[str, ...], str]] = {
-    ("video.first_frame",): (
-        "the reference waits for its next key frame, one a second, so its single waits are anything between"
-        " 180 and 1040 ms. Both are connected to at moments spread evenly over that second."
+    ("ros.flat",): (
+        "Fast DDS needs about 10 microseconds for each message that arrives, in its own threads, whether or"
+        " not anybody takes it. That grows with the rate; the thread that samples needs the same at any."
     ),
-    ("video.first_frame_ten_ms",): (
+    ("watch.p99_healthy", "status.p99"): (
+        "callers and gateway share the cores of one machine. Where other programs take these, both rows rise"
+        " beyond their bars."
+    ),
+    ("video.cpu", "video.cpu_in_turns"): (
+        "what is above the reference is Python once per frame (`preview/pipeline/framing.py`), and the hop"
+        " between the camera's and the encoder's thread. In turns, what else the machine does differs"
+        " between the two sides of a round."
+    ),
+    ("video.first_frame",): (
+        "the reference waits for its next key frame, one a second, so its single waits are spread over more"
+        " than a second. Both are connected to at moments spread evenly over that second."
+    ),
+    ("video.first_frame_ten_ms", "video.first_frame_ten_key_frames"): (
         "srtsink listens with a backlog of 1, so some of ten simultaneous SRT handshakes are refused; these"
         " viewers redial after 100 ms, and the slowest shows it."
     ),
     ("soak.rss_growth_mib",): (
-        "resident memory moves between 93 and 123 MiB with what libsrt holds for the last few seconds; the"
-        " lowest figures of an early and of the last window are compared."
+        "resident memory moves by tens of MiB with what libsrt holds for the last few seconds; the lowest"
+        " figures of an early and of the last window are compared."
+    ),
+    ("soak.gateway_rss_growth_mib", "soak.gateway_fds_growth"): (
+        "the lowest figures of an early and of the last window are compared, as those of the preview service."
     ),
 }
 """Text by the rows that it is about. A published row that misses its bar has one, with the reason."""

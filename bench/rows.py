@@ -26,13 +26,14 @@ class Row:
         bar: the promised limit, on the ratio where there is a reference, else on the value. None: published
             for comparison, without a promise.
         better: "lower": at most the bar keeps the promise; "higher": at least the bar does.
-        judged: "median" of the rounds, or the "worst" of them where the promise is about every one.
+        judged: "median" of the rounds; the "worst" of them where the promise is about every one; their "sum"
+            where it is about all together. Only the median of references is known.
         discarded: rounds that were measured and left out, because they were not comparable.
         single: whether one long round is all there is (a soak).
 
     Raises:
-        MeasurementError: fewer than FEWEST_ROUNDS rounds, references that do not pair with them, or a
-            reference that is not above 0, with which a ratio means nothing.
+        MeasurementError: fewer than FEWEST_ROUNDS rounds, references that do not pair with them or with
+            `judged`, or a reference that is not above 0, with which a ratio means nothing.
     """
 
     name: str
@@ -42,7 +43,7 @@ class Row:
     bar: float | None
     references: Sequence[float] = ()
     better: Literal["lower", "higher"] = "lower"
-    judged: Literal["median", "worst"] = "median"
+    judged: Literal["median", "worst", "sum"] = "median"
     discarded: int = 0
     single: bool = False
 
@@ -51,15 +52,24 @@ class Row:
             raise MeasurementError(f"{self.name}: {len(self.values)} rounds are too few")
         if self.references and len(self.references) != len(self.values):
             raise MeasurementError(f"{self.name}: every round needs its reference")
+        if self.references and self.judged != "median":
+            raise MeasurementError(f"{self.name}: a ratio is that of the medians")
         if any(reference <= 0 for reference in self.references):
             raise MeasurementError(f"{self.name}: a reference of 0 makes no ratio")
 
     @property
     def value(self) -> float:
-        """Median or worst round of ours."""
+        """What is judged of our rounds."""
         if self.judged == "median":
-            return statistics.median(self.values)
+            return self.median
+        if self.judged == "sum":
+            return sum(self.values)
         return max(self.values) if self.better == "lower" else min(self.values)
+
+    @property
+    def median(self) -> float:
+        """Median round of ours, however the row is judged."""
+        return statistics.median(self.values)
 
     @property
     def reference(self) -> float | None:
@@ -102,7 +112,8 @@ class Row:
         written = {name: getattr(self, name) for name in self.__slots__}
         written["values"] = [_rounded(value) for value in self.values]
         written["references"] = [_rounded(value) for value in self.references]
-        derived = {"value": self.value, "reference": self.reference, "ratio": self.ratio}
+        names = ("value", "median", "reference", "ratio")
+        derived = {name: getattr(self, name) for name in names}
         return (
             written
             | {name: None if figure is None else _rounded(figure) for name, figure in derived.items()}

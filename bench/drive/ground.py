@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any, Final
 from unittest.mock import patch
 
+import psutil
+
 from bench.processes import program
 from tests.support.driven_robot import (
     DrivenRobot,
@@ -39,6 +41,12 @@ class Ground:
     directory: Path
     base: Base
     drive: RunningDrive
+
+    @property
+    def worker_pid(self) -> int:
+        """Process ID of the worker, which the guard replaces when it is lost."""
+        (worker,) = psutil.Process(self.drive.process.pid).children()
+        return worker.pid
 
     @contextmanager
     def robot(self) -> Iterator[DrivenRobot]:

@@ -4,18 +4,20 @@ Each round has a gateway and a driver of its own.
 """
 
 import asyncio
+import os
 import signal
 import statistics
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final, Literal
 
 from bench.drive.ground import Driver, Ground, driver, link
 from bench.processes import program
 from bench.progress import log
 from bench.rows import FEWEST_ROUNDS, Row
 from console.client import AsyncGatewayClient
+from tests.support.bad_links import Relay
 from tests.support.driven_robot import DrivenRobot, available, stop_by
 from tests.support.tcp_link import TcpLink
 from tests.support.waiting import wait_until
@@ -32,18 +34,34 @@ LOSSY_STOPS: Final = 400
 
 @dataclass(frozen=True, slots=True)
 class _Round:
+    """A driver who moves a robot, and what is between them; None where it is on the same machine."""
+
+    ground: Ground
     robot: DrivenRobot
     driver: Driver
-    link: TcpLink | None
+    link: TcpLink | None = None
+    relay: Relay | None = None
 
 
 def _release(it: _Round) -> float:
     return float(it.driver.ask("release")) / 1e9
 
 
-def _kill_driver(it: _Round) -> float:
+def _signal_driver(number: signal.Signals) -> Callable[[_Round], float]:
+    return lambda it: _signal(it.driver.process.pid, number)
+
+
+def _signal_gateway(number: signal.Signals) -> Callable[[_Round], float]:
+    return lambda it: _signal(it.robot.gateway.process.pid, number)
+
+
+def _signal_worker(number: signal.Signals) -> Callable[[_Round], float]:
+    return lambda it: _signal(it.ground.worker_pid, number)
+
+
+def _signal(pid: int, number: signal.Signals) -> float:
     began_s = time.monotonic()
-    it.driver.process.kill()
+    os.kill(pid, number)
     return began_s
 
 
@@ -54,13 +72,18 @@ def _cut(it: _Round) -> float:
     return began_s
 
 
-def _signal_gateway(number: signal.Signals) -> Callable[[_Round], float]:
-    def send(it: _Round) -> float:
-        began_s = time.monotonic()
-        it.robot.gateway.process.send_signal(number)
-        return began_s
+def _lose_answers(it: _Round) -> float:
+    assert it.link
+    began_s = time.monotonic()
+    it.link.down.loss = 1.0
+    return began_s
 
-    return send
+
+def _fall_silent(it: _Round) -> float:
+    assert it.relay
+    began_s = time.monotonic()
+    it.relay.fall_silent()
+    return began_s
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,21 +92,26 @@ class _Fault:
 
     Args:
         happens: has it happen; returns when, in s of CLOCK_MONOTONIC.
-        far: whether the driver is behind a link.
+        over: what is between driver and robot.
     """
 
     what: str
     happens: Callable[[_Round], float]
     bar_ms: float
-    far: bool = False
+    over: Literal["nothing", "a link", "a relay"] = "nothing"
 
 
 FAULTS: Final[Mapping[str, _Fault]] = {
     "release": _Fault("the driver releases", _release, 60),
-    "client_killed": _Fault("the driver's program is killed", _kill_driver, 100),
-    "cable_cut": _Fault("the network is cut, round trip 20 ms", _cut, 280, far=True),
+    "client_killed": _Fault("the driver's program is killed", _signal_driver(signal.SIGKILL), 100),
+    "client_frozen": _Fault("the driver's program is frozen", _signal_driver(signal.SIGSTOP), 280),
+    "cable_cut": _Fault("the network is cut, round trip 20 ms", _cut, 280, over="a link"),
+    "lanes_silent": _Fault("both lanes fall silent and stay open", _fall_silent, 280, over="a relay"),
+    "downlink": _Fault("the way to the driver is cut, round trip 20 ms", _lose_answers, 450, over="a link"),
     "gateway_killed": _Fault("the gateway is killed", _signal_gateway(signal.SIGKILL), 60),
     "gateway_frozen": _Fault("the gateway is frozen", _signal_gateway(signal.SIGSTOP), 280),
+    "worker_killed": _Fault("the worker of robot-drive is killed", _signal_worker(signal.SIGKILL), 150),
+    "worker_frozen": _Fault("the worker of robot-drive is frozen", _signal_worker(signal.SIGSTOP), 150),
 }
 
 
@@ -113,16 +141,22 @@ def rows(ground: Ground, wanted: set[str]) -> list[Row]:
 def stopped_ms(ground: Ground, fault: _Fault) -> float:
     """Returns how long the base moves after a fault, in ms."""
     with ground.robot() as robot:
-        if not fault.far:
-            return _stopped_ms(robot, fault, robot.target, None)
-        with link(robot) as far:
-            return _stopped_ms(robot, fault, far.target, far)
+        match fault.over:
+            case "nothing":
+                return _stopped_ms(fault, robot.target, ground, robot)
+            case "a link":
+                with link(robot) as far:
+                    return _stopped_ms(fault, far.target, ground, robot, link=far)
+            case "a relay":
+                with Relay(robot.gateway.port) as relay:
+                    target = f"127.0.0.1:{relay.port}"
+                    return _stopped_ms(fault, target, ground, robot, relay=relay)
 
 
-def _stopped_ms(robot: DrivenRobot, fault: _Fault, target: str, far: TcpLink | None) -> float:
+def _stopped_ms(fault: _Fault, target: str, ground: Ground, robot: DrivenRobot, **between: Any) -> float:
     with driver(target, "--stay") as hands:
         wait_until(lambda: robot.base.moves, "the base moves")
-        began_s = fault.happens(_Round(robot, hands, far))
+        began_s = fault.happens(_Round(ground, robot, hands, **between))
         time.sleep(QUIET_S)
         took_ms = robot.base.stopped_after_s(began_s) * 1000
         # What was frozen, or waits for packets, could not end.

@@ -32,6 +32,11 @@ def missing(found: dict[str, set[int]], first: dict[str, int], last: dict[str, i
     return sum(len(each - found.get(topic, set())) for topic, each in wanted.items())
 
 
+def gaps(found: dict[str, set[int]]) -> int:
+    """Returns how many messages are missing between the first and the last one of each topic."""
+    return sum(max(each) - min(each) + 1 - len(each) for each in found.values() if each)
+
+
 def newest_ns(folder: Path) -> int:
     """Returns the log time of the newest message in a folder's segments; 0 without any."""
     newest = 0

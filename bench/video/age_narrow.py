@@ -1,6 +1,11 @@
-"""Age of the pictures over a link that is narrower than the stream, and over one that turns bad and good."""
+"""Age of the pictures over a link that is narrower than the stream, and over one that turns bad and good.
+
+Age is that of the picture on the screen at every moment: while no new one comes, it grows. A viewer that
+stands still for three seconds shows a picture of three seconds ago, however young the next one is.
+"""
 
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -9,6 +14,7 @@ from bench.rows import FEWEST_ROUNDS, Row
 from bench.video import product
 from bench.video.camera import Camera, camera
 from bench.video.far_viewing import FarWatch, torn_row, watch_far
+from bench.video.window import longest_gap_ms
 from console.client import PreviewProfile
 from tests.support.udp_link import Impairment, UdpLink
 
@@ -26,35 +32,72 @@ _LOSS: Final = 0.05
 _SETTLE_S: Final = 2.5
 
 
+@dataclass(frozen=True, slots=True)
+class _Kind:
+    """A narrow link and a bit rate.
+
+    Args:
+        name: begin of its rows' names.
+        queue_s: longest wait before the bottleneck.
+        adaptive: whether the bit rate follows the link.
+        worst_ms: promised highest age.
+        p95_ms: promised 95th percentile after FIRST_S; None for no promise, and no row.
+    """
+
+    name: str
+    queue_s: float
+    adaptive: bool
+    worst_ms: float
+    p95_ms: float | None = None
+
+    @property
+    def what(self) -> str:
+        """The link, for people."""
+        rate = "adaptive" if self.adaptive else "fixed bit rate"
+        return f"HIGH_QUALITY through {LIMIT_KBPS} kbit/s with a queue of {self.queue_s:g} s, {rate}"
+
+
+KINDS: Final = (
+    _Kind("video.age_narrow", 0.2, adaptive=True, worst_ms=800, p95_ms=300),
+    _Kind("video.age_narrow_fixed", 0.2, adaptive=False, worst_ms=1000),
+    _Kind("video.age_deep", 2.0, adaptive=True, worst_ms=800, p95_ms=300),
+    _Kind("video.age_deep_fixed", 2.0, adaptive=False, worst_ms=1000),
+)
+"""What a shallow queue has no room for is lost; in a deep one, as mobile networks have, it waits."""
+_FIGURES: Final = ("p95_ms", "worst_ms", "freeze_ms", "torn")
+_CHANGING: Final = "video.age_changing"
+
+
 def rows(workdir: Path, wanted: set[str]) -> list[Row]:
     found: list[Row] = []
     with camera(workdir, FPS) as source:
-        fixed_wanted = {name for name in wanted if name.startswith("video.age_narrow_fixed")}
-        changing_wanted = {name for name in wanted if name.startswith("video.age_changing")}
-        if wanted - fixed_wanted - changing_wanted:
-            with product.robot(workdir, source, LATENCY_MS, far=True) as robot:
-                found += _adaptive_rows([_narrow(source, robot, "adaptive") for _ in range(ROUNDS)])
-        if fixed_wanted:
-            fixed = {"adaptive": {"enabled": False}}
-            with product.robot(workdir, source, LATENCY_MS, settings=fixed, far=True) as robot:
-                found += _fixed_rows([_narrow(source, robot, "fixed") for _ in range(ROUNDS)])
-        if changing_wanted:
+        for kind in KINDS:
+            if wanted & {f"{kind.name}_{figure}" for figure in _FIGURES}:
+                found += _rows(workdir, source, kind)
+        if wanted & {f"{_CHANGING}_freeze_ms", f"{_CHANGING}_reconnects"}:
             with product.robot(workdir, source, LATENCY_MS, far=True) as robot:
                 found += _changing_rows([_changing(source, robot) for _ in range(ROUNDS)])
     return [row for row in found if row.name in wanted]
 
 
-def _narrow(source: Camera, robot: product.Robot, kind: str) -> FarWatch:
+def _rows(workdir: Path, source: Camera, kind: _Kind) -> list[Row]:
+    settings = {} if kind.adaptive else {"adaptive": {"enabled": False}}
+    with product.robot(workdir, source, LATENCY_MS, settings=settings, far=True) as robot:
+        found = [_narrow(source, robot, kind) for _ in range(ROUNDS)]
+    return _narrow_rows(kind, found)
+
+
+def _narrow(source: Camera, robot: product.Robot, kind: _Kind) -> FarWatch:
     """Watches from the viewer's first frame on."""
     found = watch_far(
         source,
         robot,
-        Impairment(delay_s=DELAY_S, rate_kbps=LIMIT_KBPS),
+        Impairment(delay_s=DELAY_S, rate_kbps=LIMIT_KBPS, queue_s=kind.queue_s),
         settle_s=0.0,
         watch_s=WATCH_S,
         profile=PreviewProfile.HIGH_QUALITY,
     )
-    _log(f"{LIMIT_KBPS} kbit/s, {kind}", found)
+    _log(kind.what, found)
     return found
 
 
@@ -80,53 +123,47 @@ def _changing(source: Camera, robot: product.Robot) -> FarWatch:
     return found
 
 
-def _worst_ms(found: FarWatch) -> float:
-    return max(one.latency_ms for one in found.after(0.0).glances)
-
-
 def _log(what: str, found: FarWatch) -> None:
-    late = found.after(FIRST_S)
     log(
-        f"{what}: worst {_worst_ms(found):.0f} ms, after {FIRST_S:g} s median {late.median_ms:.0f} ms, 95th"
-        f" percentile {late.p95_ms:.0f} ms, {late.frames_per_s:.1f} fps; freeze {found.freeze_ms:.0f} ms,"
-        f" {found.torn} torn, {found.redials} redials, {found.delivery['rejoins']} rejoined"
+        f"{what}: on the glass {found.glass().worst_ms:.0f} ms old at worst, after {FIRST_S:g} s 95 % of the"
+        f" time below {found.glass(FIRST_S).p95_ms:.0f} ms; {found.window.frames_per_s:.1f} fps, freeze"
+        f" {found.freeze_ms:.0f} ms, {found.torn} torn, {found.redials} redials,"
+        f" {found.delivery['rejoins']} rejoined"
     )
 
 
-def _adaptive_rows(found: list[FarWatch]) -> list[Row]:
-    what = f"HIGH_QUALITY through {LIMIT_KBPS} kbit/s, adaptive"
-    return [
+def _narrow_rows(kind: _Kind, found: list[FarWatch]) -> list[Row]:
+    rows = [
         Row(
-            name="video.age_narrow_p95_ms",
-            what=f"{what}: capture to decoded, 95th percentile after the first {FIRST_S:g} s",
+            name=f"{kind.name}_worst_ms",
+            what=f"{kind.what}: highest age of the picture on the screen, while none comes, too",
             unit="ms",
-            values=[each.after(FIRST_S).p95_ms for each in found],
-            bar=300,
-        ),
-        Row(
-            name="video.age_narrow_worst_ms",
-            what=f"{what}: the oldest frame that was ever shown",
-            unit="ms",
-            values=[_worst_ms(each) for each in found],
-            bar=800,
+            values=[each.glass().worst_ms for each in found],
+            bar=kind.worst_ms,
             judged="worst",
         ),
-        torn_row("video.age_narrow_torn", what, found),
+        Row(
+            name=f"{kind.name}_freeze_ms",
+            what=f"{kind.what}: longest time without a new whole frame, from the first one on",
+            unit="ms",
+            values=[longest_gap_ms(each.glances, each.first_s, each.until_s) for each in found],
+            bar=None,
+            judged="worst",
+        ),
+        torn_row(f"{kind.name}_torn", kind.what, found),
     ]
-
-
-def _fixed_rows(found: list[FarWatch]) -> list[Row]:
-    what = f"HIGH_QUALITY through {LIMIT_KBPS} kbit/s, fixed bit rate"
+    if kind.p95_ms is None:
+        return rows
     return [
         Row(
-            name="video.age_narrow_fixed_worst_ms",
-            what=f"{what}: the oldest frame that was ever shown",
+            name=f"{kind.name}_p95_ms",
+            what=f"{kind.what}: age of the picture on the screen in 95 % of the time, after the first"
+            f" {FIRST_S:g} s",
             unit="ms",
-            values=[_worst_ms(each) for each in found],
-            bar=1000,
-            judged="worst",
+            values=[each.glass(FIRST_S).p95_ms for each in found],
+            bar=kind.p95_ms,
         ),
-        torn_row("video.age_narrow_fixed_torn", what, found),
+        *rows,
     ]
 
 
@@ -134,14 +171,15 @@ def _changing_rows(found: list[FarWatch]) -> list[Row]:
     what = f"loss 0, {_LOSS:.0%}, 0, then 8, {LIMIT_KBPS / 1000:g}, 8 Mbit/s"
     return [
         Row(
-            name="video.age_changing_freeze_ms",
+            name=f"{_CHANGING}_freeze_ms",
             what=f"{what}: longest time without a whole frame",
             unit="ms",
             values=[each.freeze_ms for each in found],
             bar=250,
+            judged="worst",
         ),
         Row(
-            name="video.age_changing_reconnects",
+            name=f"{_CHANGING}_reconnects",
             what=f"{what}: connections beyond the first",
             unit="",
             values=[each.redials + each.delivery["rejoins"] for each in found],

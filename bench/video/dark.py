@@ -11,7 +11,7 @@ import json
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -22,17 +22,22 @@ from bench.video import foreign, product
 from bench.video.viewing import PATIENCE_S
 from bench.video.window import Glance, longest_gap_ms
 from console.client import PreviewProfile
+from console.receiver.address import StreamAddress
 from console.receiver.errors import StreamError
 from console.receiver.frame import Frame, PixelFormat
 from console.viewer.session import VideoSession
 from tests.support.encoder_doubles import doubles
+from tests.support.receiver import Receiver
 from tests.support.running_preview import DOUBLES_DIR, ROOT
+from tests.support.udp_link import UdpLink
 
 ROUNDS: Final = FEWEST_ROUNDS
 LATENCY_MS: Final = 125
 PROMISED_MS: Final = 2000
 AFTER_FRAMES: Final = 90
 """Of the encoder until it fails: the viewer has joined by then."""
+LOSS: Final = 0.4
+"""Of the link that turns bad."""
 SETTLE_S: Final = 1.0
 RESTART_DELAY_S: Final = 0.1
 """Docker's pause before it restarts a container the first time."""
@@ -50,23 +55,38 @@ class _Failure:
         name: end of the row's name.
         what: what happens, for people.
         fault: the double's word for it (tests/support/encoder_doubles).
-        trigger: what makes it fail; None where it fails by itself.
+        trigger: what makes it fail, held until another encoder runs; None where it fails by itself.
     """
 
     name: str
     what: str
     fault: str
-    trigger: Callable[[product.Robot], None] | None = None
+    trigger: Callable[[product.Robot], AbstractContextManager[None]] | None = None
 
 
-def _change_profile(robot: product.Robot) -> None:
+@contextmanager
+def _change_profile(robot: product.Robot) -> Iterator[None]:
     robot.client.enable_preview(PreviewProfile.LOW_BW)
+    yield
 
 
-def _join(robot: product.Robot) -> None:
+@contextmanager
+def _join(robot: product.Robot) -> Iterator[None]:
     # The request for its key frame is what fails; the stream of this encoder ends under the viewer.
     with robot.viewer() as viewer, suppress(StreamError):
         viewer.next_frame(PATIENCE_S)
+    yield
+
+
+@contextmanager
+def _bad_link(robot: product.Robot) -> Iterator[None]:
+    """Another viewer's link turns bad, and the bit rate is to follow it."""
+    with UdpLink(robot.address.port) as link:
+        far = StreamAddress(product.HOST, link.port, LATENCY_MS)
+        with Receiver(far, queue_size=4, options=product.SRT_DELIVERY) as viewer:
+            viewer.next_frame(PATIENCE_S)
+            link.impairment.loss = LOSS
+            yield
 
 
 FAILURES: Final = (
@@ -77,6 +97,7 @@ FAILURES: Final = (
     _Failure("crash", "crashes the process", f"crash:{AFTER_FRAMES}"),
     _Failure("profile_change", "never returns from a change of profile", "stuck:5", _change_profile),
     _Failure("key_frame", "never returns from a request for a key frame", f"deaf:{AFTER_FRAMES}", _join),
+    _Failure("bit_rate", "never returns from a change of bit rate", f"stuck:{AFTER_FRAMES}", _bad_link),
 )
 
 
@@ -114,8 +135,8 @@ def _round(workdir: Path, failure: _Failure) -> float:
     ):
         if failure.trigger:
             viewer.wait_for(lambda: len(viewer.seen) > AFTER_FRAMES, f"{failure.name}: frames before")
-            failure.trigger(robot)
-        viewer.wait_for(viewer.has_other_encoder, f"{failure.name}: another encoder")
+        with failure.trigger(robot) if failure.trigger else nullcontext():
+            viewer.wait_for(viewer.has_other_encoder, f"{failure.name}: another encoder")
         frames = len(viewer.seen)
         viewer.wait_for(lambda: len(viewer.seen) > frames + 10, f"{failure.name}: frames afterwards")
         glances = list(viewer.seen)

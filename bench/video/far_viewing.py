@@ -11,7 +11,7 @@ from typing import Any, Final
 from bench.rows import Row
 from bench.video import product
 from bench.video.camera import Camera
-from bench.video.window import Glance, Window, longest_gap_ms
+from bench.video.window import Glance, Glass, Window, longest_gap_ms
 from console.client import PreviewProfile
 from console.receiver.delivery import DeliveryChoice
 from tests.support.udp_link import Impairment, UdpLink
@@ -68,10 +68,20 @@ class FarWatch:
         """Longest time without a new whole frame in the window."""
         return longest_gap_ms(self.glances, self.from_s, self.until_s)
 
-    def after(self, seconds: float) -> Window:
-        """Returns the window from so long after the first frame on."""
-        first_s = min(one.decoded_s for one in self.glances)
-        return Window.of(self.glances, first_s + seconds, self.until_s)
+    def glass(self, after_s: float = 0.0) -> Glass:
+        """Returns the picture that the viewer looked at.
+
+        Args:
+            after_s: so long after the first one it begins, unless the window ends before.
+        """
+        from_s = self.first_s + after_s
+        return Glass(self.glances, from_s if from_s < self.until_s else self.first_s, self.until_s)
+
+    @property
+    def first_s(self) -> float:
+        """When the first frame was decoded; the begin of the window where none came before its end."""
+        decoded_s = (one.decoded_s for one in self.glances if one.decoded_s < self.until_s)
+        return min(decoded_s, default=self.from_s)
 
 
 def watch_far(

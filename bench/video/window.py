@@ -4,7 +4,9 @@ import statistics
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Self
+from typing import Final, Self
+
+_HALVINGS: Final = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +94,52 @@ def longest_gap_ms(glances: Iterable[Glance], from_s: float, until_s: float) -> 
     decoded_s = sorted(one.decoded_s for one in glances if not one.corrupt)
     within_s = [from_s, *(one for one in decoded_s if from_s <= one <= until_s), until_s]
     return max(later - earlier for earlier, later in pairwise(within_s)) * 1000
+
+
+class Glass:
+    """Age of the picture that a viewer looks at, from the first one on, at every moment.
+
+    It is that of the newest whole frame, and grows until another one is decoded: a viewer that shows nothing
+    new shows an old picture. One that never shows any counts as if it had an old one from the beginning.
+
+    Args:
+        glances: everything that a viewer saw.
+        from_s: begin of the time that counts, unless the first frame comes later.
+        until_s: its end.
+    """
+
+    def __init__(self, glances: Iterable[Glance], from_s: float, until_s: float) -> None:
+        whole = [one for one in glances if not one.corrupt and one.decoded_s < until_s]
+        shown = sorted(whole, key=lambda one: one.decoded_s) or [Glance(from_s, from_s)]
+        ends_s = [*(one.decoded_s for one in shown[1:]), until_s]
+        self._ages_s = [
+            (max(one.decoded_s, from_s) - one.captured_s, min(end_s, until_s) - one.captured_s)
+            for one, end_s in zip(shown, ends_s, strict=True)
+            if min(end_s, until_s) > max(one.decoded_s, from_s)
+        ]
+        """Of each picture, when it came and when the next one did."""
+
+    @property
+    def worst_ms(self) -> float:
+        """Highest age."""
+        return max(last_s for _, last_s in self._ages_s) * 1000
+
+    @property
+    def p95_ms(self) -> float:
+        """Age that was not exceeded in 95 % of the time."""
+        low_s, high_s = min(first_s for first_s, _ in self._ages_s), self.worst_ms / 1000
+        whole_s = sum(last_s - first_s for first_s, last_s in self._ages_s)
+        for _ in range(_HALVINGS):
+            limit_s = (low_s + high_s) / 2
+            if self._below_s(limit_s) < 0.95 * whole_s:
+                low_s = limit_s
+            else:
+                high_s = limit_s
+        return high_s * 1000
+
+    def _below_s(self, limit_s: float) -> float:
+        """Returns for how long the age was below a limit."""
+        return sum(max(0.0, min(last_s, limit_s) - first_s) for first_s, last_s in self._ages_s)
 
 
 def slope(counts: Sequence[float], figures: Sequence[float]) -> float:

@@ -4,11 +4,12 @@ from collections.abc import Iterator
 
 import pytest
 
-from bench.drive import cpu, losses, stopping, thawing
+from bench.drive import cpu, losses, picture, revoking, stopping, thawing
 from bench.drive.ground import Ground, driven_ground, driver
 from tests.support.tcp_link import needs_tun
 
 pytestmark = pytest.mark.ros
+# Timed: on a machine that is busy with other tests, late commands would end the motion.
 
 
 @pytest.fixture(scope="module")
@@ -17,12 +18,31 @@ def ground(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ground]:
         yield running
 
 
-def test_a_round_of_a_fault(ground: Ground) -> None:
-    assert 0 < stopping.stopped_ms(ground, stopping.FAULTS["gateway_killed"]) < 1000
+@pytest.mark.parametrize("fault", ["gateway_killed", "client_frozen", "lanes_silent", "worker_killed"])
+def test_a_round_of_a_fault(ground: Ground, fault: str) -> None:
+    assert 0 < stopping.stopped_ms(ground, stopping.FAULTS[fault]) < 1000
+
+
+@needs_tun
+@pytest.mark.timed
+@pytest.mark.parametrize("fault", ["cable_cut", "downlink"])
+def test_a_round_of_a_fault_of_a_link(ground: Ground, fault: str) -> None:
+    assert 0 < stopping.stopped_ms(ground, stopping.FAULTS[fault]) < 1000
 
 
 def test_a_round_of_stops_under_siege(ground: Ground) -> None:
     assert stopping.viewer_ms(ground, stops=5, watchers=10) > 0
+
+
+@pytest.mark.gst
+@pytest.mark.timed
+def test_a_round_of_the_picture(ground: Ground) -> None:
+    assert 0 < picture.stopped_ms(ground, "camera") < 2000
+
+
+@pytest.mark.timed
+def test_a_round_of_a_revocation(ground: Ground) -> None:
+    assert 0 < revoking.moved_ms(ground) < 3000
 
 
 def test_a_round_of_freezing(ground: Ground) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from bench.rec import cpu, killing, losing, recovering, snapshots
 from bench.rec.ground import PRESET, ros_domain, talker
-from bench.rec.reading import missing
+from bench.rec.reading import gaps, missing
 from tests.support.running_recorder import RecorderProgram, recorder_program
 
 pytestmark = pytest.mark.ros
@@ -28,11 +28,17 @@ def test_a_round_of_losing_counts_what_the_publisher_has_counted(recorder: Recor
         found = losing.one_round(recorder, publisher, 2.0)
     assert found.published > 1000
     assert 0 <= found.untaken <= found.lost <= found.published
+    assert found.gaps >= found.lost - found.untaken
+    assert found.miscounted >= 0
 
 
 def test_missing_messages_are_counted() -> None:
     found = {"/a": {1, 2, 4, 5}, "/b": {7}}
     assert missing(found, {"/a": 1, "/b": 6, "/c": 0}, {"/a": 5, "/b": 8, "/c": 2}) == 1 + 1 + 2
+
+
+def test_gaps_are_between_messages() -> None:
+    assert gaps({"/a": {2, 3, 5, 9}, "/b": {7}, "/c": set()}) == 1 + 3
 
 
 def test_windows_of_cpu(recorder: RecorderProgram, tmp_path: Path) -> None:

@@ -2,11 +2,29 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from bench.video import camera_switching, latency, product, switching
+from bench.video import (
+    camera_switching,
+    joining_together,
+    latency,
+    peers,
+    product,
+    receiver_cpu,
+    reference,
+    switching,
+)
 from bench.video.camera import Camera, camera
+from bench.video.far_viewing import FarWatch, watch_far
+from bench.video.window import Glance
+from common.gst import Gst
+from preview.config import PreviewSettings
+from preview.encoders.catalogue import CATALOGUE
+from preview.encoders.properties import configure
+from preview.values import Profile
+from tests.support.udp_link import Impairment
 
 pytestmark = pytest.mark.gst
 
@@ -31,6 +49,21 @@ def test_a_cell_of_the_latency(source: Camera, robot: product.Robot, ours: bool)
     assert 0 < found.delivered_percent <= 100
 
 
+@pytest.mark.parametrize("name", peers.PEERS)
+def test_a_round_of_a_peer(source: Camera, robot: product.Robot, name: str) -> None:
+    found = peers.one_round(name, source, robot, settle_s=0.5, watch_s=1.0)
+    assert 0 < found.median_ms <= found.p99_ms
+    assert 0 < found.delivered_percent <= 100
+
+
+def test_a_round_of_the_viewers_cpu(robot: product.Robot) -> None:
+    with robot.preview():
+        found = receiver_cpu.one_round(robot.client.target, settle_s=2.0, watch_s=1.0)
+    for each in found:
+        assert each.ms_per_frame > 0
+        assert 1 < each.fps < 40
+
+
 def test_a_round_of_switches(robot: product.Robot) -> None:
     # LOW_BW has 15 frames per second, so the longest gap is no shorter than 67 ms, less some jitter.
     assert switching.round_ms(robot, settle_s=0.3, apart_s=0.6) > 50
@@ -43,3 +76,58 @@ def test_a_round_of_cameras(source: Camera, tmp_path: Path) -> None:
         assert robot.client.status().preview.wanted_camera == "front"
     # At 30 frames per second no gap is shorter than 33 ms.
     assert longest_ms > 30
+
+
+def test_a_round_of_viewers_that_join_at_once(source: Camera, tmp_path: Path) -> None:
+    with product.robot(tmp_path, source, latency.LATENCY_MS, settings=joining_together.SETTINGS) as robot:
+        found = joining_together.one_round(robot, viewers=3)
+    assert found.slowest_ms > 0
+    assert 1 <= found.key_frames <= 3
+
+
+def test_a_watch_over_a_narrow_link(source: Camera, tmp_path: Path) -> None:
+    narrow = Impairment(delay_s=0.01, rate_kbps=1500, queue_s=2.0)
+    with product.robot(tmp_path, source, latency.LATENCY_MS, far=True) as robot:
+        found = watch_far(source, robot, narrow, settle_s=0.0, watch_s=2.0)
+    # A frame is no younger than the link is long, and a picture is on the screen until the next one comes.
+    assert found.glass().worst_ms >= found.glass().p95_ms > 10
+    assert found.glass().worst_ms > max(one.latency_ms for one in found.window.glances)
+
+
+def far_watch(*seen: Glance) -> FarWatch:
+    return FarWatch(seen, 1.0, 13.0, 360, 0.0, 0, {}, 0, "")
+
+
+def test_the_age_over_a_link_begins_with_the_first_frame() -> None:
+    late = far_watch(Glance(4.9, 5.0), Glance(8.9, 9.0))
+    assert late.first_s == 5.0
+    assert late.glass().worst_ms == pytest.approx(4100)
+    assert late.glass(6.0).worst_ms == pytest.approx(4100)
+    assert late.glass(6.0).p95_ms == pytest.approx(4100 - 0.05 * 2000)
+
+
+@pytest.mark.parametrize("seen", [(), (Glance(12.8, 12.9),), (Glance(12.9, 13.1),)])
+def test_a_link_that_delivers_next_to_nothing_has_an_age(seen: tuple[Glance, ...]) -> None:
+    watch = far_watch(*seen)
+    assert watch.glass().worst_ms > 0
+    assert watch.glass(3.0).p95_ms > 0
+
+
+def test_the_reference_encodes_as_the_preview_does() -> None:
+    settings = PreviewSettings()
+    target = settings.profiles.targets[Profile.BALANCED]
+    gop_frames = round(settings.encoders.key_frame_interval_s * target.fps)
+    ours = Gst.ElementFactory.make("x264enc")
+    configure(ours, CATALOGUE["x264"], target.bitrate_kbps, gop_frames, target.bitrate_kbps)
+    theirs = Gst.parse_launch(reference.same_encoder())
+    assert properties(theirs) == properties(ours)
+    plain = Gst.parse_launch(reference.PLAIN_X264)
+    assert properties(plain) != properties(ours), "nothing is compared"
+
+
+def properties(element: Any) -> dict[str, Any]:
+    return {
+        each.name: element.get_property(each.name)
+        for each in element.list_properties()
+        if each.name not in {"name", "parent"}
+    }

@@ -45,11 +45,19 @@ def test_the_worst_round_is_the_one_farthest_from_the_promise(better: str, worst
     assert row(references=(), judged="worst", better=better).value == worst
 
 
+def test_all_rounds_together_are_their_sum() -> None:
+    measured = row(references=(), judged="sum", values=[0.0, 1.0, 0.0, 0.0, 1.0], better="lower", bar=1)
+    assert (measured.value, measured.median, measured.spread) == (2.0, 0.0, (0.0, 1.0))
+    assert not measured.ok
+
+
 @pytest.mark.parametrize(
     ("changed", "reason"),
     [
         ({"values": [1.0] * 4, "references": [1.0] * 4}, "too few"),
         ({"values": [], "references": [], "single": True}, "too few"),
+        ({"judged": "worst"}, "that of the medians"),
+        ({"judged": "sum"}, "that of the medians"),
         ({"references": [1.0] * 4}, "every round needs its reference"),
         ({"references": [50.0, 50.0, 0.0, 50.0, 50.0]}, "reference of 0"),
     ],

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bench.video.window import Glance, Window, longest_gap_ms, slope
+from bench.video.window import Glance, Glass, Window, longest_gap_ms, slope
 
 
 def glances(*times_s: tuple[float, float]) -> list[Glance]:
@@ -50,6 +50,38 @@ def test_the_longest_gap_counts_the_edges(times_s: tuple[float, ...], longest_ms
 
 def test_a_torn_frame_does_not_end_a_gap() -> None:
     assert longest_gap_ms([Glance(1.5, 1.5, corrupt=True)], 1.0, 2.0) == pytest.approx(1000)
+
+
+def test_a_picture_grows_old_until_the_next_one() -> None:
+    # Decoded after 100 ms each, at 1.0, 1.1 and 3.0: the second is 2 s old when the third comes.
+    glass = Glass(glances((0.9, 1.0), (1.0, 1.1), (2.9, 3.0)), 0.0, 3.1)
+    assert glass.worst_ms == pytest.approx(2000)
+    # Only in the last 5 % of the 2.1 s was it older than that.
+    assert glass.p95_ms == pytest.approx(2000 - 0.05 * 2100)
+
+
+def test_the_end_counts_as_a_next_picture() -> None:
+    assert Glass(glances((0.9, 1.0)), 0.0, 5.0).worst_ms == pytest.approx(4100)
+    assert Glass(glances((0.9, 1.0), (7.0, 7.1)), 0.0, 5.0).worst_ms == pytest.approx(4100)
+
+
+def test_only_the_time_from_the_begin_on_counts() -> None:
+    seen = glances((0.1, 2.0), (2.0, 2.1), (2.1, 2.2))
+    assert Glass(seen, 0.0, 2.3).worst_ms == pytest.approx(2000)
+    assert Glass(seen, 2.15, 2.3).worst_ms == pytest.approx(200)
+    # Both pictures are between 150 and 200 ms old at some time.
+    assert Glass(seen, 2.15, 2.3).p95_ms == pytest.approx(200 - 0.05 * 150 / 2)
+
+
+def test_a_torn_picture_is_none() -> None:
+    seen = [Glance(0.9, 1.0), Glance(1.9, 2.0, corrupt=True), Glance(2.9, 3.0)]
+    assert Glass(seen, 0.0, 3.05).worst_ms == pytest.approx(2100)
+
+
+def test_without_any_picture_the_age_is_that_of_the_beginning() -> None:
+    for nothing in (Glass((), 1.0, 13.0), Glass(glances((12.0, 13.5)), 1.0, 13.0)):
+        assert nothing.worst_ms == pytest.approx(12000)
+        assert nothing.p95_ms == pytest.approx(0.95 * 12000)
 
 
 def test_slope_for_one_more_viewer() -> None:
