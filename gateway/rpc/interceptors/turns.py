@@ -90,6 +90,8 @@ class Turns(Interceptor[CallContext]):
         while queue.waiting and (queue.examined < EXAMINED or not pending):
             turn = next(iter(queue.waiting))
             self._remove(turn, queue)
+            if turn.cancelled():
+                continue  # its caller has left, which `_wait` is about to notice
             turn.set_result(None)
             queue.examined += 1
         self._judge(queue)
@@ -107,7 +109,7 @@ class Turns(Interceptor[CallContext]):
         except asyncio.CancelledError:
             if turn in queue.waiting:
                 self._remove(turn, queue)
-            else:  # its caller has left in the moment when its turn came
+            elif not turn.cancelled():  # its caller has left in the moment when its turn came
                 call.examined = True
                 self.end_turn(call)
             raise
