@@ -21,6 +21,7 @@ from gateway.rpc.calls.call import CallContext
 from gateway.rpc.calls.methods import CONTRACT, SERVICES, Method
 from gateway.rpc.interceptors.audit import Audit, AuditStart
 from gateway.rpc.interceptors.auth import Auth
+from gateway.rpc.interceptors.exemption import Exemption
 from gateway.rpc.interceptors.presence import Presence
 from gateway.rpc.interceptors.rate_limit import RateLimit
 from gateway.rpc.interceptors.stats import Stats
@@ -98,6 +99,7 @@ class Interceptors:
             [
                 ErrorInterceptor(),  # turns what any of the others raises into a status
                 self.stats,  # counts what the others refuse, too
+                *([Exemption(self.auth)] if self.auth else []),  # before any limit
                 self.turns,  # before a stranger's call costs anything
                 self.rate_limit,  # before any call costs anything
                 self.audit,  # records what auth and validation refuse

@@ -43,7 +43,7 @@ class _Queue:
 
 
 class Turns(Interceptor[CallContext]):
-    """Has calls of pending connections wait for their turn; others, and stops, pass.
+    """Has calls of pending connections wait for their turn; others, and stops of known callers, pass.
 
     When a connection is admitted, all its calls go on at once. Used on one event loop.
 
@@ -62,7 +62,7 @@ class Turns(Interceptor[CallContext]):
 
     def on_call(self, call: CallContext) -> Awaitable[None] | None:
         """Takes a turn; returns an awaitable if there is none yet."""
-        if call.method.unlimited or not self._admission.is_pending(call.peer):
+        if call.unlimited or not self._admission.is_pending(call.peer):
             return None
         address = call.peer.address
         queue = self._queues.get(address)

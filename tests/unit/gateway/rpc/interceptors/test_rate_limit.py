@@ -250,3 +250,13 @@ def test_a_stop_is_never_refused_and_takes_nothing_from_others() -> None:
             assert limit.on_call(call_of("StopRobot", peer=peer, service=TELEOP.full_name)) is None
     with pytest.raises(TooMuchError):
         none_left.take_token(peer_of("a"))
+
+
+def test_a_stop_of_an_unknown_caller_takes_a_token() -> None:
+    admission = Admission(LimitSettings(requests_per_s=1, burst=1), Clock())
+    limit = RateLimit(admission, RefusalDelay(), admits=False)
+    stop = call_of("StopRobot", peer="ipv4:10.1.1.97:1", service=TELEOP.full_name)
+    stop.unlimited = False
+    assert limit.on_call(stop) is None
+    with pytest.raises(TooMuchError):
+        admission.take_token(peer_of("a"))

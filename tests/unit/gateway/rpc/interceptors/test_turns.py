@@ -164,6 +164,16 @@ async def test_a_stop_never_waits(ground: Ground) -> None:
     await leave(arrived)
 
 
+async def test_a_stop_of_an_unknown_caller_waits_like_any_other_call(ground: Ground) -> None:
+    arrived = ground.arrive(EXAMINED)
+    stop = call_of("StopRobot", service=TELEOP.full_name)
+    stop.unlimited = False
+    stopping = Arrived(ground.turns, stop)
+    await settle()
+    assert stopping.waits
+    await leave([*arrived, stopping])
+
+
 async def test_a_unix_socket_has_no_turns(ground: Ground) -> None:
     assert not any(each.waits for each in ground.arrive(100, peer="unix:/run/gateway.sock"))
 
