@@ -73,6 +73,7 @@ def test_the_way_of_a_call_passes_the_interceptors_in_their_order() -> None:
     known = {
         "errors": "ErrorInterceptor",
         "exemption": "Exemption",
+        "room": "Room",
         "turn end": "TurnEnd",
         "audit start": "AuditStart",
     }

@@ -89,7 +89,7 @@ class Auth(Interceptor[CallContext]):
         """
         try:
             call.principal = principal = await self._authenticate(call)
-            self._admit(call)
+            self._admit(call, principal.name)
         except (NotAuthenticatedError, TooMuchError) as error:
             self._dismiss(call)
             call.refusal = error
@@ -101,9 +101,9 @@ class Auth(Interceptor[CallContext]):
             assert task is not None  # noqa: S101  # gRPC serves each call in a task of its own
             self._streams[call] = task
 
-    def _admit(self, call: CallContext) -> None:
+    def _admit(self, call: CallContext, name: str) -> None:
         try:
-            self._admission.admit(call.peer)
+            self._admission.admit(call.peer, name)
         except TooMuchError:
             # A stop needs no place.
             if not call.method.unlimited:

@@ -47,6 +47,8 @@ class RateLimit(Interceptor[CallContext]):
             if call.method.streaming:
                 self._admission.open_stream(call.peer)
         except TooMuchError as error:
+            if self._refusals.full:
+                self._admission.note_excess(call.peer)
             return self._refusals.refuse(error, call.waited_s)
         return None
 
