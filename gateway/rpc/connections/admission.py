@@ -14,7 +14,7 @@ from typing import Final
 from common.errors import TooMuchError
 from common.reasons import Reason
 from common.token_bucket import TokenBucket
-from gateway.access.address_prefix import address_prefix
+from gateway.access.address_prefix import address_prefix, host_of
 from gateway.config import LimitSettings
 from gateway.rpc.calls.call import Peer
 from gateway.rpc.connections.blocklist import Blocklist
@@ -330,4 +330,4 @@ class Admission:
 
 def _prefix_of(address: str) -> str:
     """Returns the prefix of a `Peer.address`."""
-    return address_prefix(address.rpartition(":")[0].strip("[]"))
+    return address_prefix(host_of(address))
