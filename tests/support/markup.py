@@ -45,7 +45,9 @@ def no_widget_takes_markup(window: QWidget) -> None:
     for label in (each for each in widgets if isinstance(each, QLabel)):
         plain = label.textFormat() is Qt.TextFormat.PlainText
         assert plain or not QtGui.Qt.mightBeRichText(label.text()), label.text()
-    for each in [*widgets, *window.findChildren(QtGui.QAction)]:
+    actions = window.findChildren(QtGui.QAction)
+    shown: list[QWidget | QtGui.QAction] = [*widgets, *actions]
+    for each in shown:
         for tip in (each.toolTip(), each.statusTip(), each.whatsThis(), *_tips_of_items(each)):
             assert not SHOWN.search(seen := shown_by_qt(tip)) or MARKUP in seen, tip
 
