@@ -73,7 +73,9 @@ EMPTY_METHOD = "/bench.Reference/Empty"
 CONSTANT_METHOD = "/bench.Reference/Constant"
 RAISE_METHOD = "/bench.Reference/Raise"
 CONSTANT_EVERY_S = 0.1
-_UNLIMITED: Final = LimitSettings(requests_per_s=1e9, burst=1_000_000_000)
+_UNLIMITED: Final = LimitSettings(
+    requests_per_s=1e9, burst=1_000_000_000, caller_requests_per_s=1e9, connections_per_caller=1000
+)
 """The rate limiter runs and refuses no call."""
 _MODE: Final = SourceSettings(kind="mode", topic="/mode", type="std_msgs/msg/String", stale_after_ms=1000)
 _FIVE_FAULTS: Final = Diagnostics(

@@ -32,8 +32,9 @@ MAX_TEXT_BYTES: Final = 1000
 MAX_SIDE_PX: Final = 8192
 MAX_FRAME_BYTES: Final = 32 << 20
 """A frame of 3840x2160 pixels with four bytes each has 31.6 MiB."""
-LEAST_SEALS: Final = 0x0002
-"""F_SEAL_SHRINK (fcntl.h): a memfd that shrinks under a mapping would end the reader with SIGBUS."""
+LEAST_SEALS: Final = 0x0002 | 0x0008
+"""F_SEAL_SHRINK and F_SEAL_WRITE (fcntl.h): a memfd that shrinks under a mapping would end the reader with
+SIGBUS, and one that changes could become another picture between a decoder's looks at size and content."""
 _TOPIC: Final = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 MAX_TOPIC_CHARACTERS: Final = 255
 

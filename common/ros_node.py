@@ -122,6 +122,25 @@ def ros_node(name: str, *, parameters: bool = False) -> Iterator[Any]:
 
 
 @contextmanager
+def readable_names() -> Iterator[None]:
+    """Turns what rclpy makes of a name in the graph that is no text into an error for people.
+
+    rcl refuses such names, but a participant of another vendor, or an attacker's, may announce one.
+
+    Raises:
+        UserError: while the block asked for such a name.
+    """
+    try:
+        yield
+    except UnicodeDecodeError as error:
+        raise UserError(
+            "the graph can't be listed: a program in this ROS domain announces itself with a name that is no "
+            f"text ({error})",
+            "Set ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST, so that other machines are left out",
+        ) from error
+
+
+@contextmanager
 def _started_context() -> Iterator[Context]:
     context = Context()
     try:

@@ -54,17 +54,23 @@ def possible_connections(wanted: int) -> int:
     return wanted if descriptors == resource.RLIM_INFINITY else min(wanted, descriptors // 2)
 
 
-def new_server(chain: Chain | None = None, *, max_connections: int = _MAX_CONNECTIONS) -> grpc.aio.Server:
+def new_server(
+    chain: Chain | None = None,
+    *,
+    max_connections: int = _MAX_CONNECTIONS,
+    max_calls: int = _MAX_CONCURRENT_CALLS,
+) -> grpc.aio.Server:
     """Returns a server that is neither bound nor started.
 
     Args:
         chain: what every call passes; by default an ErrorInterceptor alone.
         max_connections: accepted at once at each of its addresses; any more are closed before TLS.
             No more than `possible_connections`.
+        max_calls: served at once; any more are refused before the chain.
     """
     at_most = ("grpc.max_allowed_incoming_connections", possible_connections(max_connections))
     return grpc.aio.server(
         interceptors=(chain or Chain([ErrorInterceptor()]),),
         options=(*_SERVER_OPTIONS, at_most),
-        maximum_concurrent_rpcs=_MAX_CONCURRENT_CALLS,
+        maximum_concurrent_rpcs=max_calls,
     )

@@ -37,6 +37,7 @@ NAMES: Final = (
     "admission",
     "video_stream",
     "video_tap",
+    "camera_taps_packet",
     "segment",
     "export_request",
     "hubs_command",

@@ -6,6 +6,7 @@ from typing import Any, Final
 from mcap.records import Channel, Message, Schema
 from rclpy.serialization import serialize_message
 
+from common import camera_tap
 from common.ca import new_ca
 from common.video_tap import Header, Kind, encode_object
 from fuzz import recording
@@ -25,6 +26,7 @@ from omniseer.gateway.v1 import (
     robot_gateway_pb2,
     states_pb2,
     system_status_pb2,
+    teleop_pb2,
     value_pb2,
 )
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
@@ -188,6 +190,17 @@ _SEEDS: Final = {
             loss_percent=2.5,
             delivery=preview_pb2.PICTURE_DELIVERY_DIRECT,
         ).SerializeToString(),
+        teleop_pb2.StopRobotRequest(reason="a person", request_id="s1").SerializeToString(),
+        teleop_pb2.ResetStopRequest(stop_id=7).SerializeToString(),
+        teleop_pb2.DriveRequest(
+            open=teleop_pb2.DriveOpen(client_name="window", take_over=True, session_id="s1")
+        ).SerializeToString(),
+        teleop_pb2.DriveRequest(command=teleop_pb2.DriveCommand(sequence=9)).SerializeToString(),
+        recording_pb2.StartRecordingRequest(request_id="r1", label="a run").SerializeToString(),
+        recording_pb2.ExportRecordingRequest(
+            recording_id="20260101-120000-ab12", file="data.mcap", offset=1 << 40, expected_sha256=bytes(32)
+        ).SerializeToString(),
+        recording_pb2.DeleteRecordingRequest(request_id="r2", recording_id="r1").SerializeToString(),
     ],
     "gateways_request": [preview_pb.ApplyDesiredStateRequest(desired=_DESIRED_STATE).SerializeToString()],
     "previews_report": [_ACTUAL.SerializeToString()],
@@ -230,6 +243,11 @@ _SEEDS: Final = {
     ],
     "video_stream": [_video("h264"), _video("h265")],
     "video_tap": [_tap()],
+    "camera_taps_packet": [
+        camera_tap.encode_text(camera_tap.Kind.PROBLEM, "no camera"),
+        camera_tap.encode_watch("/camera/image_raw"),
+        camera_tap.STATUS_REQUEST,
+    ],
     "segment": [b"\0" + recording.unfinished(), b"\1" + _chunk_content()],
     "export_request": [
         recording_pb2.ExportRecordingRequest(

@@ -17,6 +17,7 @@ from bridge.commands.judgement import LONGEST_EXPIRY_S, Snapshot, Stray, judge
 from bridge.commands.judgement import Request as Handed
 from bridge.robot.feed import Feed, FeedError
 from bridge.values import DropReason, Position
+from common import camera_tap
 from common.ca import certificate_info
 from common.config import load
 from common.errors import DomainError, InvalidRequestError, UserError
@@ -42,7 +43,7 @@ from gateway.config import GatewaySettings, load_settings
 from gateway.links.preview.wire import from_wire
 from gateway.links.watch import LinkLostError
 from gateway.ros.list_truncation import truncate_list
-from gateway.rpc.calls.methods import CONTRACT, Method
+from gateway.rpc.calls.methods import SERVICES, Method
 from gateway.rpc.interceptors.validation import Validation
 from gateway.status.event import ControlAction, ControlResult
 from omniseer.gateway.v1.robot_gateway_pb2 import SubscribeEventsResponse
@@ -55,7 +56,7 @@ Target = Callable[[bytes], None]
 
 _VALIDATION: Final = Validation(GatewaySettings().limits.request_bytes)
 _OBEYED: Final = frozenset(CONTROL_CHARACTERS)
-_METHODS: Final = [Method(f"/{CONTRACT.full_name}/{method.name}") for method in CONTRACT.methods]
+_METHODS: Final = [Method(f"/{each.full_name}/{name}") for each in SERVICES for name in each.methods_by_name]
 
 
 def operators_request(data: bytes) -> None:
@@ -64,6 +65,17 @@ def operators_request(data: bytes) -> None:
         call: Any = SimpleNamespace(method=method, request=None)
         with suppress(DomainError):
             _VALIDATION.on_request(call, data)
+
+
+def camera_taps_packet(data: bytes) -> None:
+    """Packets of the camera tap, as the preview takes them in, and requests, as the tap does."""
+    with suppress(camera_tap.MalformedPacketError):
+        header, content = camera_tap.decode(data)
+        assert header.kind is not camera_tap.Kind.FRAME or 0 < header.size <= camera_tap.MAX_FRAME_BYTES
+        _must_be_one_line(camera_tap.decode_text(content))
+    with suppress(camera_tap.MalformedPacketError):
+        topic = camera_tap.decode_request(data)
+        assert topic is None or camera_tap.is_topic(topic)
 
 
 def gateways_request(data: bytes) -> None:
@@ -252,6 +264,7 @@ TARGETS: Final[Mapping[str, Target]] = MappingProxyType(
             admission,
             video_stream,
             video_tap,
+            camera_taps_packet,
             segment,
             export_request,
             hubs_command,

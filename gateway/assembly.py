@@ -48,10 +48,12 @@ from gateway.platform.sampler import PlatformSampler
 from gateway.rpc.calls.methods import SERVICES
 from gateway.rpc.calls.recipient import Recipients
 from gateway.rpc.connections.admission import MAX_PENDING, Admission
+from gateway.rpc.connections.caller_shares import CallerShares
 from gateway.rpc.connections.guard import ConnectionGuard
 from gateway.rpc.connections.refusal_delay import RefusalDelay
 from gateway.rpc.hub_requests import HubRequests
 from gateway.rpc.interceptors.audit import Audit
+from gateway.rpc.interceptors.caller_limit import CallerLimit
 from gateway.rpc.interceptors.presence import Presence
 from gateway.rpc.interceptors.rate_limit import RateLimit
 from gateway.rpc.interceptors.stats import Stats
@@ -222,6 +224,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
         turns=Turns(admission),
         rate_limit=RateLimit(admission, refusals, admits=access.auth is None),
         audit=access.audit,
+        caller_limit=CallerLimit(CallerShares(settings.limits), admission, refusals),
         auth=access.auth,
         validation=Validation(settings.limits.request_bytes),
         presence=Presence(events),

@@ -73,9 +73,9 @@ class Crowd:
         """Sends one byte of a TLS handshake each second."""
         await self._persist(lambda: self._drip_once(source), REOPEN_S)
 
-    async def flood(self, source: str, token: str) -> NoReturn:
-        """Keeps as many calls with this token open as a connection permits."""
-        headers = GET_SYSTEM_STATUS + literal(b"authorization", f"Bearer {token}".encode())
+    async def flood(self, source: str, token: str, method: bytes = GET_SYSTEM_STATUS) -> NoReturn:
+        """Keeps as many calls of one method with this token open as a connection permits."""
+        headers = method + literal(b"authorization", f"Bearer {token}".encode())
         await self._persist(lambda: self._flood_once(source, headers), FLOODER_REOPEN_S)
 
     async def _persist(self, attack: Callable[[], Awaitable[None]], pause_s: float) -> NoReturn:

@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QMenu, QToolButton
 
 from console.client import Camera, CameraState
-from console.window.labels import set_text, set_tool_tip
+from console.window.labels import plain_tip, set_text, set_tool_tip
 
 _WIDEST_PX = 140
 _MARKS: Final = {CameraState.FAILED: "does not work", CameraState.STARTING: "starting"}
@@ -51,7 +51,7 @@ class CameraMenu(QToolButton):
             action = self.cameras.addAction(_literal(f"{camera.name}  ({mark})" if mark else camera.name))
             action.setCheckable(True)
             action.setChecked(camera.name == self._wanted)
-            action.setToolTip(camera.error)
+            action.setToolTip(plain_tip(camera.error))
             action.triggered.connect(partial(self._choose, camera.name))
 
     def _choose(self, name: str, _checked: bool = False) -> None:

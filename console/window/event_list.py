@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QListWidget, QListWidgetItem
 from console.monitor.event_filter import EventFilter
 from console.monitor.event_log import CAPACITY, EventLine, EventLog
 from console.presentation.severity_style import SeverityStyle
+from console.window.labels import plain_tip
 
 _TIME_OF_DAY: Final = "%H:%M:%S"
 _DATE_AND_ZONE: Final = "%Y-%m-%d %H:%M:%S %Z"
@@ -56,7 +57,7 @@ class EventList(QListWidget):
 
 def _item(event: EventLine) -> QListWidgetItem:
     item = QListWidgetItem(f"{_clock(event.at_s, _TIME_OF_DAY)}  {event.text}")
-    item.setToolTip(_clock(event.at_s, _DATE_AND_ZONE))
+    item.setToolTip(plain_tip(_clock(event.at_s, _DATE_AND_ZONE)))
     font = item.font()
     font.setItalic(event.own)
     font.setBold(event.style in (SeverityStyle.WARNING, SeverityStyle.BAD))

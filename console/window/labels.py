@@ -72,8 +72,13 @@ def set_text(label: QLabel | QAbstractButton, text: str) -> None:
 
 
 def set_tool_tip(widget: QWidget, text: str) -> None:
-    """Changes a tool tip, as plain text: Qt itself takes a text that looks like markup for markup."""
-    widget.setToolTip(f"<span>{escape(text)}</span>" if text else "")
+    """Changes a tool tip, as plain text."""
+    widget.setToolTip(plain_tip(text))
+
+
+def plain_tip(text: str) -> str:
+    """Returns the tip that shows a text as it is: Qt itself takes one that looks like markup for markup."""
+    return f"<span>{escape(text)}</span>" if text else ""
 
 
 def set_bold(label: QLabel, bold: bool) -> None:

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QBoxLayout, QSizePolicy, QWidget
 
 from console.monitor.history import METRICS, SLOTS, History, Metric, top_of_scale
 from console.presentation.formatting import bit_rate
+from console.window.labels import set_tool_tip
 from console.window.layout import fill
 from console.window.theme import CURVE_ON_DARK, CURVE_ON_LIGHT, dim_text, is_dark, mixed
 
@@ -29,7 +30,7 @@ class Plot(QWidget):
         self._metric = metric
         self._series: list[float | None] = []
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        self.setToolTip(f"{metric.title} in {metric.unit}: the last two minutes")
+        set_tool_tip(self, f"{metric.title} in {metric.unit}: the last two minutes")
 
     @property
     def value_text(self) -> str:

@@ -7,7 +7,7 @@ from console.client import PreviewProfile
 from console.monitor.preview_controls import Controls
 from console.presentation.preview_switch import PROFILES
 from console.window.camera_menu import CameraMenu
-from console.window.labels import PlainLabel, set_text
+from console.window.labels import PlainLabel, set_text, set_tool_tip
 from console.window.layout import fill
 from console.window.marked_word import MarkedWord
 
@@ -67,7 +67,7 @@ class PreviewPanel(QWidget):
     def _profile_button(self, profile: PreviewProfile) -> QPushButton:
         title, tip = _TITLES[profile]
         button = QPushButton(title)
-        button.setToolTip(tip)
+        set_tool_tip(button, tip)
         button.setCheckable(True)
         _check(button, profile, True)
         button.setMinimumWidth(button.sizeHint().width())

@@ -1,6 +1,5 @@
 """The list of recordings: a picture and three lines each, updated in place."""
 
-from html import escape
 from itertools import takewhile
 from typing import Final
 
@@ -13,6 +12,7 @@ from console.monitor.recorder_controls import RecordingItem
 from console.presentation.recording import is_written
 from console.presentation.severity_style import SeverityStyle
 from console.receiver.key_frame import HEIGHT_PX, PICTURE_BYTES, WIDTH_PX
+from console.window.labels import plain_tip
 from console.window.theme import draw_shape
 
 _ID: Final = Qt.ItemDataRole.UserRole
@@ -74,7 +74,7 @@ class RecordingList(QListWidget):
         if item.text() != text:
             item.setText(text)
             item.setData(Qt.ItemDataRole.AccessibleTextRole, text.replace("\n", ", "))
-            item.setToolTip(f"<span>{escape(each.tip)}</span>")
+            item.setToolTip(plain_tip(each.tip))
         before = self._items.get(each.recording.id)
         shown = (before.picture, before.style) if before else None
         if shown != (each.picture, each.style):

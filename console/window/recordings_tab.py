@@ -25,7 +25,7 @@ from console.monitor.recorder_controls import (
 )
 from console.monitor.recordings import ExportState
 from console.window.cell import SmallLabel
-from console.window.labels import WrappedLabel, scale_font, set_text, set_tool_tip
+from console.window.labels import WrappedLabel, plain_tip, scale_font, set_text, set_tool_tip
 from console.window.layout import fill
 from console.window.lines import LineList, NoteLine
 from console.window.marked_word import MarkedWord
@@ -105,7 +105,7 @@ class RecordingsTab(QWidget):
             self.presets.clear()
             for number, each in enumerate(choices):
                 self.presets.addItem(each.name, each.name)
-                self.presets.setItemData(number, each.meaning, Qt.ItemDataRole.ToolTipRole)
+                self.presets.setItemData(number, plain_tip(each.meaning), Qt.ItemDataRole.ToolTipRole)
             self.presets.setCurrentIndex(max(0, self.presets.findData(chosen)))
         meaning = next((each.meaning for each in choices if each.name == self.preset), "")
         set_text(self.meaning, meaning)

@@ -107,7 +107,7 @@ class TopBar(QWidget):
 def _button(text: str, tip: str, *, checkable: bool = False) -> QToolButton:
     button = QToolButton()
     button.setText(text)
-    button.setToolTip(tip)
+    set_tool_tip(button, tip)
     button.setAccessibleName(tip)
     button.setCheckable(checkable)
     button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)

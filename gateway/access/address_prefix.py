@@ -7,6 +7,11 @@ _IPV6_PREFIX_BITS: Final = 64
 """A host chooses the remaining 64 bits freely (interface identifier, RFC 4291 2.5.1)."""
 
 
+def host_of(address: str) -> str:
+    """Returns the host of "HOST:PORT", without the brackets of IPv6."""
+    return address.rpartition(":")[0].strip("[]")
+
+
 def address_prefix(host: str) -> str:
     """Returns an IPv4 address as it is, the /64 prefix of an IPv6 address, and any other text unchanged."""
     try:

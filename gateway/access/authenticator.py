@@ -76,6 +76,17 @@ class Authenticator:
             )
         return self._principal(credential)
 
+    def accepts(self, token: str | None, fingerprint: str | None) -> bool:
+        """Returns whether each credential that a caller shows is valid now. Takes microseconds."""
+        try:
+            if token is not None:
+                self.authenticate_token(token)
+            if fingerprint is not None:
+                self.authenticate_certificate(fingerprint)
+        except NotAuthenticatedError:
+            return False
+        return token is not None or fingerprint is not None
+
     def access_lost(self) -> NotAuthenticatedError:
         """Returns the error for a caller that is no longer `still_valid`."""
         if self._problem:

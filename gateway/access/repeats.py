@@ -74,7 +74,8 @@ class Repeats:
         """
         now_s = self._clock()
         caller = self._caller(action.who if authenticated else "", address_prefix, now_s)
-        kind: Hashable = replace(action, address=address_prefix, request_id="")
+        what = action.motion.device if action.motion else action.request
+        kind: Hashable = replace(action, address=address_prefix, request=what, request_id="")
         if kind not in caller.folds and len(caller.folds) >= MAX_KINDS:
             kind = action.result
         new = kind not in caller.folds
@@ -126,5 +127,8 @@ def _combined(older: ControlAction, newer: ControlAction) -> ControlAction:
         for name in _TEXTS
         if getattr(older, name) != getattr(newer, name)
     }
+    motion = older.motion.and_then(newer.motion) if older.motion and newer.motion else None
+    if motion:
+        differing["request"] = str(motion)
     earlier_unix_s = (*older.earlier_unix_s, older.unix_s)[:MAX_TIMES]
-    return replace(newer, count=older.count + 1, earlier_unix_s=earlier_unix_s, **differing)
+    return replace(newer, count=older.count + 1, earlier_unix_s=earlier_unix_s, motion=motion, **differing)

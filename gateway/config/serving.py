@@ -26,11 +26,18 @@ class LimitSettings(Section):
     """Connections served at once."""
     connections_per_address: int = Field(default=128, ge=1, le=10_000)
     """How many of them may come from one address, so that one computer can't take them all."""
+    connections_per_caller: int = Field(default=32, ge=1, le=10_000)
+    """How many of them one name on credentials may have, wherever they come from."""
     streams_per_connection: int = Field(default=16, ge=1, le=1000)
     requests_per_s: float = Field(default=500.0, gt=0)
     """Refill rate of each connection's token bucket."""
     burst: int = Field(default=1000, ge=1)
     """Capacity of the bucket, in requests."""
+    caller_requests_per_s: float = Field(default=1000.0, gt=0)
+    """Refill rate of each caller's token bucket, which all of its connections share; it holds twice as many.
+    A caller is a name on credentials, or an address where none is needed."""
+    caller_streams: int = Field(default=256, ge=1, le=4096)
+    """Streams that a caller may have open, over all of its connections."""
     request_bytes: int = Field(default=131_072, ge=1024, le=262_144)
     """Largest request that is accepted."""
 

@@ -21,8 +21,11 @@ from gateway.rpc.calls.call import CallContext
 from gateway.rpc.calls.methods import CONTRACT, SERVICES, Method
 from gateway.rpc.interceptors.audit import Audit, AuditStart
 from gateway.rpc.interceptors.auth import Auth
+from gateway.rpc.interceptors.caller_limit import CallerLimit
+from gateway.rpc.interceptors.exemption import Exemption
 from gateway.rpc.interceptors.presence import Presence
 from gateway.rpc.interceptors.rate_limit import RateLimit
+from gateway.rpc.interceptors.room import MAX_OPEN, Room
 from gateway.rpc.interceptors.stats import Stats
 from gateway.rpc.interceptors.turns import TurnEnd, Turns
 from gateway.rpc.interceptors.validation import Validation
@@ -36,6 +39,8 @@ from gateway.rpc.services.teleop import TeleopService
 _log = logging.getLogger(__name__)
 
 SERVICE: Final = CONTRACT.full_name
+_MAX_CALLS: Final = 2 * MAX_OPEN
+"""That gRPC serves at once: stops find room beyond MAX_OPEN, and those that are refused there end at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +93,7 @@ class Interceptors:
     turns: Turns
     rate_limit: RateLimit
     audit: Audit
+    caller_limit: CallerLimit
     auth: Auth | None
     validation: Validation
     presence: Presence
@@ -98,11 +104,14 @@ class Interceptors:
             [
                 ErrorInterceptor(),  # turns what any of the others raises into a status
                 self.stats,  # counts what the others refuse, too
+                *([Exemption(self.auth)] if self.auth else []),  # before any limit
                 self.turns,  # before a stranger's call costs anything
+                Room(),  # of which a stop needs none
                 self.rate_limit,  # before any call costs anything
                 self.audit,  # records what auth and validation refuse
                 *([self.auth] if self.auth else []),
-                TurnEnd(self.turns),  # once it is known who calls
+                self.caller_limit,  # what all connections of that caller share
+                TurnEnd(self.turns),  # once it is known who calls, and that it may
                 self.validation,
                 AuditStart(self.audit),  # records valid requests alone
                 self.presence,  # sees admitted calls alone
@@ -141,7 +150,11 @@ async def serving(
         UserError: an address can't be bound.
     """
     chain = interceptors.chain()
-    server = new_server(chain, max_connections=max_connections)
+    server = new_server(
+        chain,
+        max_connections=max_connections,
+        max_calls=_MAX_CALLS,
+    )
     methods = services.methods()
     handlers = [
         chain.service(each, {name: methods[name] for name in each.methods_by_name}) for each in SERVICES

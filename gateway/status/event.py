@@ -1,5 +1,6 @@
 """Events: what happened on the robot that an operator may want to know, one detail type per kind."""
 
+import math
 import time
 from dataclasses import dataclass, field
 from enum import Enum
@@ -79,6 +80,32 @@ class ClientLeft:
 
 
 @dataclass(frozen=True, slots=True)
+class Motion:
+    """How long and how far the robot was driven, and with what; one time of motion, or the sum of several."""
+
+    duration_s: float
+    distance_m: float
+    turned_rad: float
+    device: str
+
+    def __str__(self) -> str:
+        """Returns the text for people."""
+        by = f", by {self.device}" if self.device else ""
+        turned_deg = math.degrees(self.turned_rad)
+        return f"{self.duration_s:.1f} s, {self.distance_m:.2f} m, {turned_deg:.0f} deg{by}"
+
+    def and_then(self, newer: "Motion") -> "Motion":
+        """Returns both as one."""
+        device = newer.device if newer.device == self.device else f"{newer.device} and others"
+        return Motion(
+            self.duration_s + newer.duration_s,
+            self.distance_m + newer.distance_m,
+            self.turned_rad + newer.turned_rad,
+            device,
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class ControlAction:
     """A call that changes the robot, or tried to; also what the audit log records.
 
@@ -94,6 +121,7 @@ class ControlAction:
         unix_s: when it ended; calendar clock, seconds since 1970.
         count: how many actions this one stands for; the newest of them is described.
         earlier_unix_s: when the first of the others ended, oldest first; not more than a few.
+        motion: of a time of motion, all of those that it stands for; `request` says the same.
     """
 
     who: str
@@ -108,6 +136,7 @@ class ControlAction:
     unix_s: float = field(default_factory=time.time, compare=False)
     count: int = 1
     earlier_unix_s: tuple[float, ...] = field(default=(), compare=False)
+    motion: Motion | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)

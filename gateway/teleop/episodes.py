@@ -1,11 +1,10 @@
 """Times of motion for the audit log: who drove, how long, how far, and why it ended."""
 
-import math
 import time
 from collections import deque
 from typing import Final, Protocol
 
-from gateway.status.event import ControlAction, ControlResult
+from gateway.status.event import ControlAction, ControlResult, Motion
 from gateway.status.teleop import DriveEpisode
 from gateway.teleop.lease import Driver
 
@@ -47,16 +46,17 @@ class Episodes:
         drivers = (each for each in reversed(self._drivers) if each[0].name == episode.holder)
         driver, device = next(drivers, (Driver("", episode.holder, ""), ""))
         duration_s = (episode.ended_ns - episode.started_ns) / _NS_PER_S
-        moved = f"{duration_s:.1f} s, {episode.distance_m:.2f} m, {math.degrees(episode.turned_rad):.0f} deg"
+        motion = Motion(duration_s, episode.distance_m, episode.turned_rad, device)
         self._sink.record_action(
             ControlAction(
                 who=driver.name if driver.role else "",
                 address=driver.address or episode.holder,
                 method="Drive",
-                request=f"{moved}, by {device}" if device else moved,
+                request=str(motion),
                 result=ControlResult.ACCEPTED,
                 answer=episode.ended_by,
                 role=driver.role,
                 credential=driver.credential,
+                motion=motion,
             )
         )

@@ -1,9 +1,11 @@
 """Stops and their resets, confirmed by the drive program."""
 
+import asyncio
 import time
 from collections.abc import Callable
 from typing import Final
 
+from common.backoff import Backoff
 from common.errors import DriveUnreachableError, PreconditionError
 from common.reasons import Reason
 from gateway.links.drive.commands import DriveCommands
@@ -17,7 +19,10 @@ HOW_TO_REACH: Final = (
     "commands it publishes zeros, or nothing"
 )
 _SHARED_NS: Final = 100_000_000
-"""A caller who repeats a stop within this time gets the same answer, from memory."""
+"""A caller who repeats a stop within this time gets the answer from memory, also if others stop meanwhile."""
+_RETRY_FIRST_S: Final = 0.005
+_RETRY_LONGEST_S: Final = 0.05
+"""While the connection to the drive program takes no more."""
 _NS_PER_S: Final = 1_000_000_000
 COPIES_NS: Final = 10 * _NS_PER_S
 """A copy of a request is recognised for so long; no client waits longer for an answer."""
@@ -58,7 +63,9 @@ class Stops:
         self._link = link
         self._commands = commands
         self._stopped_ns: dict[str, int] = {}
-        """When the newest stop was confirmed, by caller; empty after a reset."""
+        """When each caller's newest stop was confirmed; empty after a reset."""
+        self._sent_ns: dict[str, int] = {}
+        """When each caller's stop was sent that is not confirmed yet."""
         self._copies = Copies()
 
     async def stop(self, by: str, reason: str, request_id: str = "") -> StopLatch:
@@ -78,22 +85,50 @@ class Stops:
         if first := self._copies.first(by, request_id, now_ns):
             return first
         recent = now_ns - self._stopped_ns.get(by, -_NS_PER_S) < _SHARED_NS
-        if stop and stop.by == by and recent and self._link.view.reachable:
-            # Repeated by the same caller, perhaps very often: one confirmation serves all.
+        if stop and recent and self._link.view.reachable:
+            # Repeated by the same caller, perhaps very often: one confirmation serves all. A newer stop of
+            # another caller holds the robot as well as its own.
             self._copies.confirmed(by, request_id, stop, now_ns)
             return stop
-        if not self._commands.stop(by, reason):
-            raise DriveUnreachableError(f"the robot's drive program can't be reached: {HOW_TO_REACH}")
-        if not await self._confirmed(now_ns, lambda view: view.phase is DrivePhase.STOPPED):
-            raise DriveUnreachableError(
-                f"the robot's drive program has not confirmed the stop: {HOW_TO_REACH}"
-            )
+        stop = await self._stop_anew(by, reason, now_ns)
+        self._copies.confirmed(by, request_id, stop, now_ns)
+        return stop
+
+    async def _stop_anew(self, by: str, reason: str, now_ns: int) -> StopLatch:
+        """Sends a stop, unless one of the same caller is on its way, and waits until it is confirmed."""
+        if sent_ns := self._sent_ns.get(by):
+            await self._wait_for_confirmation(sent_ns)
+        else:
+            await self._send(by, reason)
+            self._sent_ns[by] = now_ns
+            try:
+                await self._wait_for_confirmation(now_ns)
+            finally:
+                self._sent_ns.pop(by, None)
         stop = self._link.view.stop
         if stop is None:
             raise DriveUnreachableError(f"the stop is already reset; stop again, or {HOW_TO_REACH}")
-        self._stopped_ns = {by: time.monotonic_ns()}
-        self._copies.confirmed(by, request_id, stop, now_ns)
+        confirmed_ns = time.monotonic_ns()
+        self._stopped_ns = {
+            name: at_ns for name, at_ns in self._stopped_ns.items() if confirmed_ns - at_ns < _SHARED_NS
+        }
+        self._stopped_ns[by] = confirmed_ns
         return stop
+
+    async def _send(self, by: str, reason: str) -> None:
+        """Sends a stop; tries again while the connection is full, as long as a confirmation may take."""
+        retry, loop = Backoff(_RETRY_FIRST_S, _RETRY_LONGEST_S), asyncio.get_running_loop()
+        deadline_s = loop.time() + CONFIRMED_WITHIN_S
+        while not self._commands.stop(by, reason):
+            if not self._link.view.reachable or loop.time() > deadline_s:
+                raise DriveUnreachableError(f"the robot's drive program can't be reached: {HOW_TO_REACH}")
+            await asyncio.sleep(retry.next_s())
+
+    async def _wait_for_confirmation(self, since_ns: int) -> None:
+        if not await self._confirmed(since_ns, lambda view: view.phase is DrivePhase.STOPPED):
+            raise DriveUnreachableError(
+                f"the robot's drive program has not confirmed the stop: {HOW_TO_REACH}"
+            )
 
     def in_force(self, stop: StopLatch) -> bool:
         """Returns whether a stop was not reset, as far as the drive program has reported."""

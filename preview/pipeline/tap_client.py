@@ -179,7 +179,7 @@ def _check_memory(descriptor: int, size: int) -> None:
         seals = fcntl.fcntl(descriptor, fcntl.F_GET_SEALS)
     except OSError as error:
         raise MalformedPacketError("a frame that is not in a memfd") from error
-    if not seals & LEAST_SEALS:
-        raise MalformedPacketError("a frame in memory that may shrink")
+    if seals & LEAST_SEALS != LEAST_SEALS:
+        raise MalformedPacketError("a frame in memory that may shrink or change")
     if (there := os.fstat(descriptor).st_size) < size:
         raise MalformedPacketError(f"a frame of {size} bytes in memory of {there}")

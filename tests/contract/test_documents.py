@@ -70,7 +70,13 @@ def test_the_way_of_a_call_passes_the_interceptors_in_their_order() -> None:
     parts: dict[str, Any] = {name: SimpleNamespace(name=name) for name in names}
     chain = Interceptors(**parts).chain()
     order = [getattr(each, "name", type(each).__name__) for each in chain.interceptors]
-    known = {"errors": "ErrorInterceptor", "turn end": "TurnEnd", "audit start": "AuditStart"}
+    known = {
+        "errors": "ErrorInterceptor",
+        "exemption": "Exemption",
+        "room": "Room",
+        "turn end": "TurnEnd",
+        "audit start": "AuditStart",
+    }
     columns = (re.split(r"  +", text)[0] for _, text in drawn())
     assert [known.get(column, column) for column in columns if known.get(column, column) in order] == order
 

@@ -45,15 +45,22 @@ def _length(text: bytes) -> bytes:
 
 
 BEGINNING: Final = PREFACE + frame(SETTINGS)
-GET_SYSTEM_STATUS: Final = b"".join(
-    literal(name, value)
-    for name, value in (
-        (b":method", b"POST"),
-        (b":scheme", b"http"),
-        (b":path", b"/omniseer.gateway.v1.RobotGateway/GetSystemStatus"),
-        (b":authority", b"robot"),
-        (b"te", b"trailers"),
-        (b"content-type", b"application/grpc"),
+
+
+def call_headers(path: str) -> bytes:
+    """The headers of a call of this method, "/package.Service/Method"."""
+    return b"".join(
+        literal(name, value)
+        for name, value in (
+            (b":method", b"POST"),
+            (b":scheme", b"http"),
+            (b":path", path.encode()),
+            (b":authority", b"robot"),
+            (b"te", b"trailers"),
+            (b"content-type", b"application/grpc"),
+        )
     )
-)
-"""The headers of a call."""
+
+
+GET_SYSTEM_STATUS: Final = call_headers("/omniseer.gateway.v1.RobotGateway/GetSystemStatus")
+STOP_ROBOT: Final = call_headers("/omniseer.gateway.v1.TeleopService/StopRobot")

@@ -1,13 +1,18 @@
 """Texts of a robot that look like markup, and what Qt would make of them."""
 
+import re
+from collections.abc import Iterator
+
 from google.protobuf.message import Message
 from PySide6 import QtGui
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QComboBox, QLabel, QListWidget, QWidget
 
 from tests.support.filled import fields_of
 
 MARKUP = "<b>low</b><img src='x'>"
+SHOWN = re.compile(r"\blow\b")
+"""What is left of it where it was taken for markup."""
 
 
 def mark_up(message: Message) -> None:
@@ -40,6 +45,15 @@ def no_widget_takes_markup(window: QWidget) -> None:
     for label in (each for each in widgets if isinstance(each, QLabel)):
         plain = label.textFormat() is Qt.TextFormat.PlainText
         assert plain or not QtGui.Qt.mightBeRichText(label.text()), label.text()
-    for each in widgets:
-        for tip in (each.toolTip(), each.statusTip(), each.whatsThis()):
-            assert "low" not in (seen := shown_by_qt(tip)) or MARKUP in seen, tip
+    actions = window.findChildren(QtGui.QAction)
+    shown: list[QWidget | QtGui.QAction] = [*widgets, *actions]
+    for each in shown:
+        for tip in (each.toolTip(), each.statusTip(), each.whatsThis(), *_tips_of_items(each)):
+            assert not SHOWN.search(seen := shown_by_qt(tip)) or MARKUP in seen, tip
+
+
+def _tips_of_items(widget: object) -> Iterator[str]:
+    if isinstance(widget, QComboBox | QListWidget):
+        model = widget.model()
+        for row in range(model.rowCount()):
+            yield str(model.index(row, 0).data(Qt.ItemDataRole.ToolTipRole) or "")

@@ -58,6 +58,8 @@ class CallContext(Call):
             None otherwise.
         examined: whether it has one of its connection's turns (`Turns`).
         waited_s: how long it waited for that; 0 if it did not have to.
+        unlimited: whether no limit applies to it: a stop, unless its caller shows no valid credential
+            (`Exemption`).
         request: the first message of the caller; None before it.
         responded: whether a message has left for the caller.
         response: the newest message to the caller, of control actions alone; serialised or not.
@@ -71,6 +73,7 @@ class CallContext(Call):
         "request",
         "responded",
         "response",
+        "unlimited",
         "waited_s",
     )
 
@@ -87,6 +90,7 @@ class CallContext(Call):
         self.refusal = None
         self.examined = False
         self.waited_s = 0.0
+        self.unlimited = method.unlimited
         self.request = None
         self.responded = False
         self.response = None

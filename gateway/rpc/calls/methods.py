@@ -21,7 +21,8 @@ RECORDING: Final = recording_pb2.DESCRIPTOR.services_by_name["RecordingService"]
 SERVICES: Final = (CONTRACT, TELEOP, RECORDING)
 """All services of the operators' contract. Their methods have names of their own."""
 STOP_ROBOT: Final = "StopRobot"
-"""Exempt from every limit: it must work when nothing else does. The only control action of viewers."""
+"""Exempt from every limit for those who may call it: it must work when nothing else does. The only control
+action of viewers."""
 
 
 class Open(Enum):
@@ -54,7 +55,7 @@ class Method(interceptors.Method):
         key: unique name for statistics: `name` in the operators' contract, else "package.Service/Method".
         needed: what a caller needs.
         of_contract: whether it belongs to the operators' contract, so that it is counted and validated.
-        unlimited: whether no limit on calls, streams and connections applies.
+        unlimited: whether no limit on calls, streams and connections applies, where the caller is known.
         request_type: of the contract's methods; None for others.
         response_type: the same.
         has_parameters: whether the request has fields, and so possibly rules.

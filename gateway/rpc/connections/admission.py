@@ -14,7 +14,7 @@ from typing import Final
 from common.errors import TooMuchError
 from common.reasons import Reason
 from common.token_bucket import TokenBucket
-from gateway.access.address_prefix import address_prefix
+from gateway.access.address_prefix import address_prefix, host_of
 from gateway.config import LimitSettings
 from gateway.rpc.calls.call import Peer
 from gateway.rpc.connections.blocklist import Blocklist
@@ -55,10 +55,12 @@ class _Connection:
     bucket: TokenBucket
     pending_since_s: float
     admitted: bool = False
+    caller: str = ""
     floods: bool = False
     unused: bool = False
     streams: int = 0
     refused_s: float = -math.inf
+    excess_s: float = -math.inf
     method_buckets: dict[str, TokenBucket] = field(default_factory=dict)
 
 
@@ -87,6 +89,8 @@ class Admission:
         """By `Peer.address`, the one that called last at the end."""
         self._places: Counter[str] = Counter()
         """Taken, by address prefix."""
+        self._places_of_callers: Counter[str] = Counter()
+        """The same by name, where callers have one."""
 
     def take_token(self, peer: Peer, method: str = "") -> None:
         """Takes one token out of the connection's bucket, and of the method's if it has a rate of its own.
@@ -148,8 +152,12 @@ class Admission:
         if connection is not None:
             connection.streams -= 1
 
-    def admit(self, peer: Peer) -> None:
+    def admit(self, peer: Peer, caller: str = "") -> None:
         """Gives the connection a place, after a valid credential was shown or where none is needed.
+
+        Args:
+            peer: the other end.
+            caller: the name on the credential; empty where none is needed.
 
         Raises:
             TooMuchError: all places are taken.
@@ -158,7 +166,15 @@ class Admission:
         if connection is None or connection.admitted:
             return
         limits, prefix = self._limits, peer.address_prefix
-        if self._places[prefix] >= limits.connections_per_address and not self._evict(prefix):
+        taken = self._places_of_callers[caller] if caller else 0
+        if taken >= limits.connections_per_caller and not self._evict(caller=caller):
+            raise TooMuchError(
+                f"this gateway serves {limits.connections_per_caller} connections of {caller} at once, "
+                "and all are taken; close one, or raise limits.connections_per_caller",
+                Reason.TOO_MANY_CONNECTIONS,
+                _RETRY_AFTER_S,
+            )
+        if self._places[prefix] >= limits.connections_per_address and not self._evict(prefix=prefix):
             raise TooMuchError(
                 f"this gateway serves {limits.connections_per_address} connections of one address at once, "
                 "and yours are taken; close one, or raise limits.connections_per_address",
@@ -172,14 +188,29 @@ class Admission:
                 Reason.TOO_MANY_CONNECTIONS,
                 _RETRY_AFTER_S,
             )
-        connection.admitted = True
+        connection.admitted, connection.caller = True, caller
         self._places[prefix] += 1
+        if caller:
+            self._places_of_callers[caller] += 1
         self._blocklist.note_admitted(prefix)
 
     def is_pending(self, peer: Peer) -> bool:
         """Returns whether the connection has no place and needs one; also if it is not known yet."""
         connection = self._connections.get(peer.address)
         return peer.ip is not None if connection is None else not connection.admitted
+
+    def note_excess(self, peer: Peer) -> None:
+        """Takes down that so many calls of the connection are refused that they can't be delayed any more."""
+        connection = self._connections.get(peer.address)
+        if connection is not None:
+            connection.excess_s = self._clock()
+
+    def is_restrained(self, peer: Peer) -> bool:
+        """Returns whether calls of the connection take turns: it is pending, or was in excess lately."""
+        connection = self._connections.get(peer.address)
+        if connection is None or not connection.admitted:
+            return self.is_pending(peer)
+        return self._clock() - connection.excess_s < FORGIVEN_AFTER_S
 
     def dismiss(self, peer: Peer) -> None:
         """Takes the connection's place away, after a credential was invalid."""
@@ -248,7 +279,7 @@ class Admission:
         ]
 
     def note_flood(self, address: str) -> None:
-        """Takes down that the pending connection of this `Peer.address` calls or sends too much."""
+        """Takes down that the connection of this `Peer.address` calls or sends too much."""
         self._blocklist.note_flood(_prefix_of(address))
         connection = self._connections.get(address)
         if connection is not None:
@@ -281,12 +312,12 @@ class Admission:
             return limits.burst
         return max(1.0, min(limits.burst, limits.requests_per_s * _REDUCED_BURST_S))
 
-    def _evict(self, prefix: str | None = None) -> bool:
-        """Frees the place of the quietest connection, of this prefix or of all; False if none is quiet."""
+    def _evict(self, *, prefix: str = "", caller: str = "") -> bool:
+        """Frees the place of the quietest connection, of these or of all; returns False if none is quiet."""
         now_s = self._clock()
         for each in self._connections.values():
             quiet = each.admitted and not each.streams and now_s - each.bucket.updated_s >= QUIET_AFTER_S
-            if quiet and prefix in (None, each.address_prefix):
+            if quiet and prefix in ("", each.address_prefix) and caller in ("", each.caller):
                 self._free_place(each)
                 return True
         return False
@@ -297,8 +328,12 @@ class Admission:
             self._places[connection.address_prefix] -= 1
             if not self._places[connection.address_prefix]:
                 del self._places[connection.address_prefix]
+            if connection.caller:
+                self._places_of_callers[connection.caller] -= 1
+                if not self._places_of_callers[connection.caller]:
+                    del self._places_of_callers[connection.caller]
 
 
 def _prefix_of(address: str) -> str:
     """Returns the prefix of a `Peer.address`."""
-    return address_prefix(address.rpartition(":")[0].strip("[]"))
+    return address_prefix(host_of(address))

@@ -4,6 +4,7 @@ import asyncio
 import logging
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final, NoReturn
 
@@ -21,6 +22,9 @@ OVERRUN_BYTES: Final = 16_384
 """Instead of PENDING_BYTES while strangers connect faster than the gateway can take: a hundred calls."""
 UNTHROTTLED_BYTES: Final = 65_536
 """What it may send until it is answered slowly: hundreds of calls."""
+PLACED_BYTES_PER_S: Final = 262_144
+"""What a connection with a place may send: thrice what as many calls take as its limit permits by default.
+gRPC resets at once what a connection opens beyond its streams: no brake of the interceptors sees that."""
 THROTTLED_BYTES_PER_S: Final = 1024
 """Some ten refusals a second."""
 _LOG_EVERY_S: Final = 10.0
@@ -32,17 +36,18 @@ class _Watched:
 
     Attributes:
         placed: whether it has a place.
-        before: bytes that it had sent when it became pending.
+        before: bytes that it had sent when it became pending, or when its newest second began.
+        since_s: when that second began, if it has a place.
     """
 
     placed: bool = False
     before: int = 0
+    since_s: float = 0.0
     throttled: bool = False
     cut_off: bool = False
 
 
 _FRESH: Final = _Watched()
-_PLACED: Final = _Watched(placed=True)
 
 
 class ConnectionGuard:
@@ -50,17 +55,19 @@ class ConnectionGuard:
 
     Args:
         admission: knows which must go.
+        clock: seconds, monotonic.
 
     Attributes:
         open: connections at the last look.
         closed: connections that were closed here since the start.
-        throttled: connections that were throttled here since the start.
+        throttled: connections that were throttled here since the start, again and again some.
         muted: connections that were muted here since the start.
         policy: what the kernel enforces at present.
     """
 
-    def __init__(self, admission: Admission) -> None:
+    def __init__(self, admission: Admission, clock: Callable[[], float] = time.monotonic) -> None:
         self._admission = admission
+        self._clock = clock
         self.open = 0
         self.closed = 0
         self.throttled = 0
@@ -112,20 +119,22 @@ class ConnectionGuard:
                 self._cut_off(sockets, address)
 
     def _restrain(self, sockets: AcceptedSockets, present: list[str]) -> list[str]:
-        """Throttles pending connections that have sent much, and returns those that have sent too much."""
+        """Throttles connections that have sent much, and returns those that have sent too much, or flood."""
         pending, flooding = set(self._admission.pending()), []
         most = OVERRUN_BYTES if self._admission.overrun else PENDING_BYTES
         watched: dict[str, _Watched] = {}
         for address in present:
             state = self._watched.get(address, _FRESH)
-            if address not in pending:
-                if state.throttled:
-                    sockets.throttle(address, UNLIMITED)
-                watched[address] = _PLACED
-                continue
             received = sockets.received_bytes(address)
+            if address not in pending:
+                state = self._of_placed(sockets, address, state, received)
+                if self._admission.floods(address) and not state.cut_off:
+                    flooding.append(address)
+                    state = replace(state, cut_off=True)
+                watched[address] = state
+                continue
             if state.placed:
-                state = _Watched(before=received)
+                state = _Watched(before=received, throttled=state.throttled)
             sent = received - state.before
             if (sent > most or self._admission.floods(address)) and not state.cut_off:
                 self._admission.note_flood(address)
@@ -138,6 +147,23 @@ class ConnectionGuard:
             watched[address] = state
         self._watched = watched
         return flooding
+
+    def _of_placed(self, sockets: AcceptedSockets, address: str, state: _Watched, received: int) -> _Watched:
+        """Throttles a connection with a place while it sends more than it may."""
+        now_s = self._clock()
+        if not state.placed:
+            if state.throttled:
+                sockets.throttle(address, UNLIMITED)
+            return _Watched(placed=True, before=received, since_s=now_s)
+        excessive = received - state.before > PLACED_BYTES_PER_S
+        if excessive and not state.throttled:
+            sockets.throttle(address, THROTTLED_BYTES_PER_S)
+            self.throttled += 1
+        if now_s - state.since_s < 1.0:
+            return replace(state, throttled=state.throttled or excessive)
+        if state.throttled and not excessive:
+            sockets.throttle(address, UNLIMITED)
+        return replace(state, before=received, since_s=now_s, throttled=excessive)
 
     def _filter(self, sockets: AcceptedSockets) -> None:
         """Has the kernel keep away those who may not connect now."""

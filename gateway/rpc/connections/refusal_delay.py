@@ -15,7 +15,8 @@ REFUSAL_SPACING_S: Final = 0.005
 """Minimum spacing of delayed refusals, over all connections."""
 _MAX_DELAYED: Final = 512
 """Refusals that are delayed at once, the last of them for 3.1 s, each of some 25 KiB: all that two
-connections can have open. Any more leave at once, as fast as their connection is answered (guard.py)."""
+connections can have open. Any more leave at once, and their connection's calls wait from
+then on (`Admission.note_excess`)."""
 _LONGEST_DELAY_S: Final = REFUSAL_DELAY_S + _MAX_DELAYED * REFUSAL_SPACING_S
 """Also behind refusals whose callers have left, whose turns are not given back."""
 
@@ -28,6 +29,11 @@ class RefusalDelay:
         self._last_s = 0.0
         """When the last one of them leaves, by the event loop's clock."""
 
+    @property
+    def full(self) -> bool:
+        """Whether a further refusal leaves at once."""
+        return self._delayed >= _MAX_DELAYED
+
     async def refuse(self, error: DomainError, waited_s: float = 0.0) -> NoReturn:
         """Raises the error when it is this refusal's turn.
 
@@ -35,7 +41,7 @@ class RefusalDelay:
             error: the refusal.
             waited_s: how long its call has waited already (`Turns`).
         """
-        if self._delayed < _MAX_DELAYED:
+        if not self.full:
             self._delayed += 1
             try:
                 await asyncio.sleep(self.next_delay_s(asyncio.get_running_loop().time(), waited_s))

@@ -15,6 +15,7 @@ from common import request_id
 from common.errors import DomainError, TooMuchError
 from common.interceptors import Interceptor
 from common.reasons import Reason
+from gateway.access.address_prefix import address_prefix, host_of
 from gateway.access.repeats import Repeats
 from gateway.rpc.calls.call import CallContext
 from gateway.rpc.calls.methods import Method
@@ -50,9 +51,9 @@ class Audit(Interceptor[CallContext]):
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._events = events
-        self._done_sink = done
         self._done = Repeats(partial(self._write, done), clock)
         self._refused = Repeats(partial(self._write, refused), clock)
+        self._moved = Repeats(partial(self._write, done), clock)
 
     def applies_to(self, method: Method) -> bool:
         """Returns whether the method is a control action."""
@@ -88,8 +89,12 @@ class Audit(Interceptor[CallContext]):
             self._record(call, ControlResult.FAILED, "internal error; see the robot's log")
 
     def record_action(self, action: ControlAction) -> None:
-        """Records what a caller did in a stream, a time of motion for example. It is never folded."""
-        self._write(self._done_sink, action)
+        """Records what a caller did in a stream: a time of motion.
+
+        Repeated ones are folded apart from calls, with the sum of what was moved: a driver may hold and
+        release sixty times a second.
+        """
+        self._moved.take(action, address_prefix(host_of(action.address)))
 
     def record_request_of_hub(
         self,
@@ -124,13 +129,13 @@ class Audit(Interceptor[CallContext]):
 
     def record_due(self) -> None:
         """Records repeated actions whose time has come; to be called a few times a second."""
-        self._done.record_due()
-        self._refused.record_due()
+        for each in (self._done, self._refused, self._moved):
+            each.record_due()
 
     def record_all(self) -> None:
         """Records the repeated actions that are still only counted, at the end of the program."""
-        self._done.record_all()
-        self._refused.record_all()
+        for each in (self._done, self._refused, self._moved):
+            each.record_all()
 
     def _record(self, call: CallContext, result: ControlResult, answer: str) -> None:
         principal = call.principal

@@ -89,7 +89,7 @@ class Auth(Interceptor[CallContext]):
         """
         try:
             call.principal = principal = await self._authenticate(call)
-            self._admit(call)
+            self._admit(call, principal.name)
         except (NotAuthenticatedError, TooMuchError) as error:
             self._dismiss(call)
             call.refusal = error
@@ -101,9 +101,9 @@ class Auth(Interceptor[CallContext]):
             assert task is not None  # noqa: S101  # gRPC serves each call in a task of its own
             self._streams[call] = task
 
-    def _admit(self, call: CallContext) -> None:
+    def _admit(self, call: CallContext, name: str) -> None:
         try:
-            self._admission.admit(call.peer)
+            self._admission.admit(call.peer, name)
         except TooMuchError:
             # A stop needs no place.
             if not call.method.unlimited:
@@ -122,6 +122,10 @@ class Auth(Interceptor[CallContext]):
             return
         if not self._authenticator.still_valid(principal):
             raise self._authenticator.access_lost()
+
+    def knows(self, call: CallContext) -> bool:
+        """Returns whether the caller shows a valid credential; waits for nothing, and counts no failure."""
+        return self._authenticator.accepts(token_of(call.rpc), self._fingerprint_of(call))
 
     def on_end(self, call: CallContext, _error: BaseException | None) -> None:
         """Forgets a stream that has ended."""
@@ -205,13 +209,12 @@ class Auth(Interceptor[CallContext]):
             await asyncio.wait([task])
 
     async def _authenticate(self, call: CallContext) -> Principal:
-        token = token_of(call.rpc)
-        fingerprint = fingerprint_of(call.rpc) if self._certificates else None
+        token, fingerprint = token_of(call.rpc), self._fingerprint_of(call)
         if token is None and fingerprint is None:
             raise NotAuthenticatedError(
                 "this robot asks callers for a credential; type: robotctl login", Reason.CREDENTIAL_MISSING
             )
-        if not self._knows(token, fingerprint):
+        if not self._lists(token, fingerprint):
             await self._files.reload_for_unknown()
         by_certificate = None
         if fingerprint is not None:
@@ -223,7 +226,10 @@ class Auth(Interceptor[CallContext]):
         assert found is not None  # noqa: S101  # one of them was shown
         return found
 
-    def _knows(self, token: str | None, fingerprint: str | None) -> bool:
+    def _fingerprint_of(self, call: CallContext) -> str | None:
+        return fingerprint_of(call.rpc) if self._certificates else None
+
+    def _lists(self, token: str | None, fingerprint: str | None) -> bool:
         return (token is None or bool(self._authenticator.id_of_token(token))) and (
             fingerprint is None or self._authenticator.knows_certificate(fingerprint)
         )

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from common.interceptors import Interceptor
+from common.token_bucket import TokenBucket
 from gateway.rpc.calls.call import CallContext
 from gateway.rpc.calls.methods import Method
 from gateway.rpc.calls.ports import EventSink
@@ -15,15 +16,36 @@ from gateway.status.fault import Severity
 JOINED_AFTER_S: Final = 2.0
 """How long a stream has been open before its client has joined: one look at the status, or a client that
 reconnects again and again, is no event."""
+REPORTED: Final = 10
+"""Clients of one caller, a name or an address prefix without one, that are reported one by one."""
+REPORTED_EVERY_S: Final = 60.0
+"""After them one each minute, with the number of the others: they displace no other event soon."""
+MAX_CALLERS: Final = 64
+"""That are told apart; new ones beyond them share the reports of one."""
 _COMPONENT: Final = "gateway"
+_OTHERS: Final = ""
 
 
 @dataclass(slots=True)
 class _Client:
     since_s: float
     name: str
+    caller: str
     streams: int = 0
     joined: bool = False
+    reported: bool = False
+
+
+@dataclass(slots=True)
+class _Reports:
+    """Those of one caller.
+
+    Attributes:
+        unreported: clients that have joined since the last report.
+    """
+
+    bucket: TokenBucket
+    unreported: int = 0
 
 
 class Presence(Interceptor[CallContext]):
@@ -38,6 +60,8 @@ class Presence(Interceptor[CallContext]):
         self._events = events
         self._clock = clock
         self._clients: dict[str, _Client] = {}
+        self._reports: dict[str, _Reports] = {}
+        """By caller."""
 
     def applies_to(self, method: Method) -> bool:
         """Returns whether the method is a stream of the contract."""
@@ -46,7 +70,8 @@ class Presence(Interceptor[CallContext]):
     def on_call(self, call: CallContext) -> None:
         """Counts an open stream."""
         name = call.principal.name if call.principal else ""
-        client = self._clients.setdefault(call.peer.address, _Client(self._clock(), name))
+        caller = name or call.peer.address_prefix
+        client = self._clients.setdefault(call.peer.address, _Client(self._clock(), name, caller))
         client.streams += 1
 
     def on_end(self, call: CallContext, _error: BaseException | None) -> None:
@@ -56,7 +81,7 @@ class Presence(Interceptor[CallContext]):
         client.streams -= 1
         if client.streams == 0:
             del self._clients[address]
-            if client.joined:
+            if client.reported:
                 self._note("left", ClientLeft(address, client.name))
 
     def report_joined(self) -> None:
@@ -65,7 +90,31 @@ class Presence(Interceptor[CallContext]):
         for address, client in self._clients.items():
             if not client.joined and client.since_s <= before_s:
                 client.joined = True
-                self._note("joined", ClientJoined(address, client.name))
+                self._report(address, client)
+
+    def _report(self, address: str, client: _Client) -> None:
+        """Reports a client that has joined, or counts it where its caller has had too many reports."""
+        reports, now_s = self._reports_of(client.caller), self._clock()
+        if not reports.bucket.take(now_s, capacity=REPORTED, refill_per_s=1 / REPORTED_EVERY_S):
+            reports.unreported += 1
+            return
+        more = f" ({reports.unreported} times more since the last report)" if reports.unreported else ""
+        reports.unreported = 0
+        client.reported = True
+        self._note(f"joined{more}", ClientJoined(address, client.name))
+
+    def _reports_of(self, caller: str) -> _Reports:
+        now_s = self._clock()
+        if caller not in self._reports and len(self._reports) >= MAX_CALLERS:
+            # A bucket that is full may be forgotten: a new one holds no more.
+            self._reports = {
+                name: each
+                for name, each in self._reports.items()
+                if now_s - each.bucket.updated_s < REPORTED * REPORTED_EVERY_S
+            }
+            if len(self._reports) >= MAX_CALLERS:
+                caller = _OTHERS
+        return self._reports.setdefault(caller, _Reports(TokenBucket(REPORTED, now_s)))
 
     def _note(self, what: str, detail: ClientJoined | ClientLeft) -> None:
         message = f"{detail.who or detail.address} {what}"

@@ -15,7 +15,8 @@ class RateLimit(Interceptor[CallContext]):
     """Refuses calls beyond a connection's share with a delay; accounts for open streams.
 
     Each message of a request stream takes a token like a call, except for those of Drive, which has its own
-    limit: a client that polls as often as it may must not end its own driving. StopRobot is never refused.
+    limit: a client that polls as often as it may must not end its own driving. A stop is never refused,
+    unless its caller is unknown.
 
     Args:
         admission: the account of connections.
@@ -34,7 +35,7 @@ class RateLimit(Interceptor[CallContext]):
         Raises:
             TooMuchError: there is none left; from the awaitable, after a delay.
         """
-        if call.method.unlimited:
+        if call.unlimited:
             if self._admits:
                 with suppress(TooMuchError):
                     self._admission.admit(call.peer)
@@ -46,6 +47,8 @@ class RateLimit(Interceptor[CallContext]):
             if call.method.streaming:
                 self._admission.open_stream(call.peer)
         except TooMuchError as error:
+            if self._refusals.full:
+                self._admission.note_excess(call.peer)
             return self._refusals.refuse(error, call.waited_s)
         return None
 

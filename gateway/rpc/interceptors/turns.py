@@ -1,4 +1,4 @@
-"""Turns: few calls of a connection without an admitted one are examined at a time.
+"""Turns: few calls of a connection without an admitted one, or of one in excess, are examined at a time.
 
 To refuse a call costs nearly as much as to answer it, but to let it wait costs next to nothing. So a stranger
 that opens all the calls that a connection may have takes no more of the gateway than one that opens a few.
@@ -15,7 +15,7 @@ from gateway.rpc.calls.call import CallContext
 from gateway.rpc.connections.admission import Admission
 
 EXAMINED: Final = 8
-"""Calls of one pending connection that are examined at a time, the delay of their refusal included."""
+"""Calls of one restrained connection that are examined at a time, the delay of their refusal included."""
 FLOOD_WAITING: Final = 64
 FLOOD_S: Final = 5.0
 """With so many calls waiting for so long, a connection floods: in that time 80 have been refused."""
@@ -25,7 +25,7 @@ MAX_WAITING: Final = 1024
 
 @dataclass(slots=True)
 class _Queue:
-    """The calls of one pending connection.
+    """The calls of one restrained connection.
 
     Attributes:
         address: the connection's `Peer.address`.
@@ -43,12 +43,12 @@ class _Queue:
 
 
 class Turns(Interceptor[CallContext]):
-    """Has calls of pending connections wait for their turn; others, and stops, pass.
+    """Has calls of restrained connections wait for their turn; others, and stops of known callers, pass.
 
     When a connection is admitted, all its calls go on at once. Used on one event loop.
 
     Args:
-        admission: knows which connections are pending, and gets to know which flood.
+        admission: knows which connections are restrained, and gets to know which flood.
         clock: seconds, monotonic.
     """
 
@@ -62,7 +62,7 @@ class Turns(Interceptor[CallContext]):
 
     def on_call(self, call: CallContext) -> Awaitable[None] | None:
         """Takes a turn; returns an awaitable if there is none yet."""
-        if call.method.unlimited or not self._admission.is_pending(call.peer):
+        if call.unlimited or not self._admission.is_restrained(call.peer):
             return None
         address = call.peer.address
         queue = self._queues.get(address)
@@ -86,10 +86,12 @@ class Turns(Interceptor[CallContext]):
         address = call.peer.address
         queue = self._queues[address]
         queue.examined -= 1
-        pending = self._admission.is_pending(call.peer)
-        while queue.waiting and (queue.examined < EXAMINED or not pending):
+        restrained = self._admission.is_restrained(call.peer)
+        while queue.waiting and (queue.examined < EXAMINED or not restrained):
             turn = next(iter(queue.waiting))
             self._remove(turn, queue)
+            if turn.cancelled():
+                continue  # its caller has left, which `_wait` is about to notice
             turn.set_result(None)
             queue.examined += 1
         self._judge(queue)
@@ -107,7 +109,7 @@ class Turns(Interceptor[CallContext]):
         except asyncio.CancelledError:
             if turn in queue.waiting:
                 self._remove(turn, queue)
-            else:  # its caller has left in the moment when its turn came
+            elif not turn.cancelled():  # its caller has left in the moment when its turn came
                 call.examined = True
                 self.end_turn(call)
             raise

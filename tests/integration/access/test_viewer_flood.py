@@ -7,12 +7,19 @@ from pathlib import Path
 from typing import Any
 
 import grpc
+import pytest
 
 from common.reasons import Reason
 from common.refusal import refusal_in
 from gateway.access.role import Role
-from omniseer.gateway.v1.robot_gateway_pb2 import GetSystemStatusRequest, SetPreviewModeRequest
+from omniseer.gateway.v1.robot_gateway_pb2 import (
+    GetSystemStatusRequest,
+    SetPreviewModeRequest,
+    WatchSystemStatusRequest,
+)
 from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
+from omniseer.gateway.v1.teleop_pb2 import StopRobotRequest
+from omniseer.gateway.v1.teleop_pb2_grpc import TeleopServiceStub
 from tests.support.detour import detour
 from tests.support.guarded_gateway import Login, guarded_gateway, new_robot
 
@@ -64,3 +71,77 @@ async def test_a_viewer_that_floods_takes_its_share_and_no_operators(tmp_path: P
     assert reasons == {Reason.TOO_MANY_REQUESTS, Reason.TOO_MANY_CONNECTIONS}
     share = LIMITS["connections_per_address"] * (LIMITS["burst"] + LIMITS["requests_per_s"] * (took_s + 2))
     assert 0 < answered <= share
+
+
+async def test_more_connections_get_a_viewer_no_more(tmp_path: Path) -> None:
+    robot = new_robot(tmp_path)
+    _, viewer = robot.add(Role.VIEWER, name="ben")
+    async with guarded_gateway(robot, limits={"caller_requests_per_s": 20}) as robot:
+        ends = asyncio.Event()
+        began_s = asyncio.get_running_loop().time()
+        floods = [
+            asyncio.create_task(flood(RobotGatewayStub(robot.channel()), viewer, ends)) for _ in range(8)
+        ]
+        await asyncio.sleep(2)
+        ends.set()
+        found = await asyncio.gather(*floods)
+        took_s = asyncio.get_running_loop().time() - began_s
+    assert set().union(*(each for _, each in found)) == {Reason.TOO_MANY_REQUESTS}
+    assert 40 <= sum(count for count, _ in found) <= 20 * (2 + took_s)
+
+
+async def test_nor_more_streams_or_connections(tmp_path: Path) -> None:
+    robot = new_robot(tmp_path)
+    _, viewer = robot.add(Role.VIEWER, name="ben")
+    _, operator = robot.add(Role.OPERATOR)
+    limits = {"caller_streams": 5, "connections_per_caller": 3}
+    async with guarded_gateway(robot, limits=limits) as robot:
+
+        async def watch(login: Login) -> str:
+            """Opens a stream on a connection of its own; why it is refused."""
+            stub: Any = RobotGatewayStub(channel := robot.channel())
+            kept.append(channel)
+            stream = stub.WatchSystemStatus(WatchSystemStatusRequest(), metadata=login.metadata(), timeout=30)
+            kept.append(stream)
+            try:
+                await stream.read()
+            except grpc.aio.AioRpcError as error:
+                return refusal_in(error.trailing_metadata()).reason
+            return ""
+
+        kept: list[Any] = []
+        assert [await watch(viewer) for _ in range(4)] == ["", "", "", Reason.TOO_MANY_CONNECTIONS]
+        stub: Any = RobotGatewayStub(kept[0])
+        more = [
+            stub.WatchSystemStatus(WatchSystemStatusRequest(), metadata=viewer.metadata(), timeout=30)
+            for _ in range(3)
+        ]
+        assert [bool(await each.read()) for each in more[:2]] == [True, True]
+        with pytest.raises(grpc.aio.AioRpcError) as seen:
+            await more[2].read()
+        assert refusal_in(seen.value.trailing_metadata()).reason == Reason.TOO_MANY_STREAMS
+        assert await watch(operator) == ""
+
+
+async def test_a_stop_finds_room_when_all_calls_of_the_gateway_are_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A robot that does not drive refuses it with a reason of its own."""
+    monkeypatch.setattr("gateway.rpc.interceptors.room.MAX_OPEN", 4)
+    robot = new_robot(tmp_path)
+    _, viewer = robot.add(Role.VIEWER, name="ben")
+    async with guarded_gateway(robot) as robot:
+        channel = robot.channel()
+        stub: Any = RobotGatewayStub(channel)
+        watching = [
+            stub.WatchSystemStatus(WatchSystemStatusRequest(), metadata=viewer.metadata()) for _ in range(4)
+        ]
+        for each in watching:
+            await each.read()
+        with pytest.raises(grpc.aio.AioRpcError) as refused:
+            await stub.GetSystemStatus(GetSystemStatusRequest(), metadata=viewer.metadata(), timeout=10)
+        assert refused.value.code() is grpc.StatusCode.RESOURCE_EXHAUSTED
+        stop: Any = TeleopServiceStub(channel)
+        with pytest.raises(grpc.aio.AioRpcError) as answered:
+            await stop.StopRobot(StopRobotRequest(), metadata=viewer.metadata(), timeout=10)
+        assert answered.value.code() is grpc.StatusCode.FAILED_PRECONDITION

@@ -3,25 +3,36 @@
 import asyncio
 import socket
 import time
+from collections.abc import Awaitable, Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+import grpc
 import pytest
 
+from bench.siege.crowd import Crowd
 from gateway.access.address_prefix import address_prefix
 from gateway.access.role import Role
+from gateway.rpc.calls.call import CallContext
 from gateway.rpc.connections.accepted_sockets import AcceptedSockets
 from gateway.rpc.connections.blocklist import MAX_BLOCKED, MAX_TRUSTED, UNUSED_BURST
 from gateway.rpc.connections.guard import SCAN_EVERY_S
 from gateway.rpc.connections.packet_filter import ConnectPolicy
+from gateway.rpc.connections.refusal_delay import REFUSAL_DELAY_S, REFUSAL_SPACING_S
 from gateway.rpc.connections.shedding import MAX_ONE_IN
+from gateway.rpc.interceptors.auth import Auth
 from gateway.rpc.interceptors.turns import EXAMINED
 from omniseer.gateway.v1.robot_gateway_pb2 import GetSystemStatusRequest
 from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
+from omniseer.gateway.v1.teleop_pb2 import StopRobotRequest
+from omniseer.gateway.v1.teleop_pb2_grpc import TeleopServiceStub
+from tests.support.eventually import eventually
 from tests.support.guarded_gateway import guarded_gateway, new_robot
+from tests.support.http2 import GET_SYSTEM_STATUS, STOP_ROBOT
 
 SOON_S = 0.3
+WRONG_TOKEN = "rgt-000000000000." + "A" * 43
 
 
 def blocking(prefixes: list[str]) -> ConnectPolicy:
@@ -176,6 +187,66 @@ async def test_an_address_that_connects_again_and_again_is_blocked_and_an_operat
             socket.create_connection, ("127.0.0.1", robot.port), 10, ("127.0.6.1", 0)
         )
         again.close()
+
+
+@pytest.mark.parametrize("method", [GET_SYSTEM_STATUS, STOP_ROBOT], ids=["status", "stop"])
+async def test_of_a_stranger_that_floods_few_calls_are_examined(
+    method: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also of its stops, which are exempt from limits for those alone whom the robot knows."""
+    refused, authenticate = 0, Auth.on_call
+
+    async def counting(self: Auth, call: CallContext) -> None:
+        nonlocal refused
+        refused += 1
+        await authenticate(self, call)
+
+    monkeypatch.setattr(Auth, "on_call", counting)
+    robot = new_robot(tmp_path)
+    async with guarded_gateway(robot):
+        crowd = Crowd(("127.0.0.1", robot.port))
+        attack = asyncio.create_task(crowd.flood("127.0.6.2", WRONG_TOKEN, method))
+        began_s = time.monotonic()
+        await eventually(answered(crowd), lambda count: count > EXAMINED, "some calls are refused")
+        took_s = time.monotonic() - began_s
+        attack.cancel()
+        await asyncio.wait([attack])
+    assert refused <= 2 * EXAMINED + took_s / REFUSAL_SPACING_S
+
+
+def answered(crowd: Crowd) -> Callable[[], Awaitable[int]]:
+    async def look() -> int:
+        return crowd.counts.refused
+
+    return look
+
+
+async def test_a_stop_of_a_viewer_does_not_wait_behind_its_wrong_ones(tmp_path: Path) -> None:
+    """On a connection that a wrong token fills. A robot that does not drive refuses it with a reason."""
+    robot = new_robot(tmp_path)
+    _, login = robot.add(Role.VIEWER)
+    async with guarded_gateway(robot):
+        stub: Any = TeleopServiceStub(robot.channel())
+        wrong = [
+            asyncio.ensure_future(
+                stub.StopRobot(
+                    StopRobotRequest(), metadata=(("authorization", f"Bearer {WRONG_TOKEN}"),), timeout=10
+                )
+            )
+            for _ in range(4 * EXAMINED)
+        ]
+        refused = await asyncio.gather(wrong[0], return_exceptions=True)
+        assert isinstance(refused[0], grpc.aio.AioRpcError)
+        assert not all(each.done() for each in wrong)
+        began_s = time.monotonic()
+        with pytest.raises(grpc.aio.AioRpcError) as seen:
+            await stub.StopRobot(StopRobotRequest(), metadata=login.metadata(), timeout=5)
+        took_s = time.monotonic() - began_s
+        assert seen.value.code() is grpc.StatusCode.FAILED_PRECONDITION
+        assert took_s < REFUSAL_DELAY_S / 2
+        for each in wrong:
+            each.cancel()
+        await asyncio.gather(*wrong, return_exceptions=True)
 
 
 async def test_the_calls_of_an_operator_go_on_when_the_first_is_admitted(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 import signal
 import socket
 import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -14,6 +15,7 @@ import pytest
 from console.receiver.address import StreamAddress
 from console.receiver.errors import StreamError
 from omniseer.preview.v1 import preview_service_pb2 as pb
+from preview.pipeline.viewer_limit import HANDSHAKES_OF_HOST
 from tests.support.free import udp_port_is_free
 from tests.support.receiver import Receiver
 from tests.support.running_preview import RunningPreview
@@ -27,6 +29,7 @@ pytestmark = pytest.mark.gst
 PASSPHRASE = "correct horse battery staple"
 WATCHERS = 5
 STUTTERS = 3
+STRANGERS = 3
 LONGEST_PAUSE_S = 1.0
 
 
@@ -244,3 +247,31 @@ def test_a_port_that_is_taken_is_named_and_used_when_it_is_free(preview: Running
     preview.enable()
     preview.wait_for(lambda a: a.state == pb.LIFECYCLE_STATE_RUNNING, "running")
     assert time.monotonic() - freed_at < 10
+
+
+def test_strangers_without_the_passphrase_keep_no_viewer_out(tmp_path: Path) -> None:
+    """From another address, with as many handshakes as they can begin."""
+    with RunningPreview(tmp_path, {"srt": {"max_viewers": 2}}) as preview:
+        preview.enable(passphrase=PASSPHRASE)
+        preview.running()
+        with ExitStack() as leaving:
+            for _ in range(STRANGERS):
+                leaving.enter_context(stranger(preview.port))
+            preview.wait_for(lambda a: a.counters.viewers_refused > HANDSHAKES_OF_HOST, "the strangers call")
+            with Watcher(preview.port, PASSPHRASE) as watcher:
+                watcher.wait_for_frames(5)
+                viewers(preview, 1)
+
+
+@contextmanager
+def stranger(port: int) -> Iterator[subprocess.Popen[bytes]]:
+    """Begins a handshake from ports of its own again and again, each without waiting for the last."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tests.support.srt_stranger", "127.0.0.2", str(port)],
+        stdin=subprocess.DEVNULL,
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()

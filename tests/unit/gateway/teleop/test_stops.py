@@ -1,9 +1,19 @@
-"""Copies of a stop: which request has stopped the robot already."""
+"""Stops that are repeated: which request has stopped the robot, and what the drive program gets."""
+
+import asyncio
+import itertools
+import time
+from dataclasses import replace
+from typing import Any
 
 import pytest
 
-from gateway.status.teleop import StopLatch
-from gateway.teleop.stops import COPIES_NS, MOST_COPIES, Copies
+from common.broadcast import Broadcast
+from common.errors import DriveUnreachableError
+from gateway.status.teleop import DrivePhase, DriveView, StopLatch
+from gateway.teleop.stops import COPIES_NS, MOST_COPIES, Copies, Stops
+from tests.support.drive_views import actual
+from tests.support.virtual_time import in_virtual_time
 
 NOW_NS = 10**15
 STOP = StopLatch(stop_id=7, by="anna", reason="", since_ns=NOW_NS)
@@ -48,3 +58,92 @@ def test_many_requests_push_out_the_oldest_which_then_stop_anew() -> None:
     made.confirmed("anna", "one-more", NEWER, NOW_NS + 1)
     assert made.first("anna", "one", NOW_NS + 1) is None
     assert made.first("anna", "one-more", NOW_NS + 1) == NEWER
+
+
+class Drive:
+    """A drive program that confirms a stop in the next turn of the event loop, and what it is sent."""
+
+    def __init__(self) -> None:
+        self.changes = Broadcast()
+        self.view = DriveView(enabled=True, applied=True, error="", actual=actual())
+        self.sent: list[str] = []
+        self.full = 0
+        """So many messages more find the connection full."""
+        self._numbers = itertools.count(1)
+
+    def stop(self, by: str, reason: str) -> bool:
+        if self.full:
+            self.full -= 1
+            return False
+        self.sent.append(by)
+        asyncio.get_running_loop().call_soon(self._confirm, by, reason)
+        return True
+
+    def reset(self, _stop_id: int) -> bool:
+        self._report(DrivePhase.AVAILABLE, None)
+        return True
+
+    def _confirm(self, by: str, reason: str) -> None:
+        latch = StopLatch(next(self._numbers), by, reason, time.monotonic_ns())
+        self._report(DrivePhase.STOPPED, latch)
+
+    def _report(self, phase: DrivePhase, stop: StopLatch | None) -> None:
+        report = actual(phase=phase, stop=stop, monotonic_ns=time.monotonic_ns())
+        self.view = replace(self.view, actual=report)
+        self.changes.notify_all()
+
+
+@pytest.fixture
+def drive() -> Drive:
+    return Drive()
+
+
+def stops_of(drive: Drive) -> Stops:
+    double: Any = drive
+    return Stops(double, double)
+
+
+async def test_stops_of_two_callers_in_turns_are_few_for_the_drive_program(drive: Drive) -> None:
+    """Each caller's are confirmed once in a while, whoever stops in between."""
+    stops = stops_of(drive)
+    for _ in range(200):
+        for by in ("anna", "ben"):
+            assert await stops.stop(by, "")
+    assert drive.sent[:2] == ["anna", "ben"]
+    assert len(drive.sent) < 40
+
+
+async def test_many_stops_of_one_caller_at_once_are_one(drive: Drive) -> None:
+    stops = stops_of(drive)
+    found = await asyncio.gather(*(stops.stop("anna", "") for _ in range(200)))
+    assert {each.stop_id for each in found} == {1}
+    assert drive.sent == ["anna"]
+
+
+async def test_after_a_reset_a_stop_stops_anew(drive: Drive) -> None:
+    stops = stops_of(drive)
+    for by in ("anna", "ben"):
+        stop = await stops.stop(by, "")
+    await stops.reset(stop.stop_id)
+    assert (await stops.stop("anna", "")).stop_id == 3
+
+
+async def test_a_stop_that_finds_the_connection_full_is_sent_again(drive: Drive) -> None:
+    drive.full = 5
+    assert (await stops_of(drive).stop("anna", "")).by == "anna"
+    assert drive.sent == ["anna"]
+
+
+@in_virtual_time
+async def test_but_not_without_end(drive: Drive) -> None:
+    drive.full = 10**6
+    with pytest.raises(DriveUnreachableError):
+        await stops_of(drive).stop("anna", "")
+
+
+async def test_nor_where_the_drive_program_has_gone(drive: Drive) -> None:
+    drive.full = 10**6
+    drive.view = replace(drive.view, error="gone")
+    with pytest.raises(DriveUnreachableError, match="can't be reached"):
+        await stops_of(drive).stop("anna", "")
+    assert drive.full == 10**6 - 1

@@ -38,7 +38,10 @@ def ends(tmp_path: Path) -> Iterator[tuple[TapClient, socket.socket]]:
         client.close()
 
 
-def memory(size: int = 24, seals: int = fcntl.F_SEAL_SHRINK) -> int:
+SEALED = fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_WRITE
+
+
+def memory(size: int = 24, seals: int = SEALED) -> int:
     descriptor = os.memfd_create("frame", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
     os.write(descriptor, bytes(range(size)))
     fcntl.fcntl(descriptor, fcntl.F_ADD_SEALS, seals)
@@ -101,6 +104,8 @@ def test_the_end_of_the_tap_is_one(ends: tuple[TapClient, socket.socket]) -> Non
         (FRAME.encode(), None, "0 descriptors"),
         (FRAME.encode(), regular_file, "not in a memfd"),
         (FRAME.encode(), lambda: memory(seals=0), "may shrink"),
+        (FRAME.encode(), lambda: memory(seals=SEALED & ~fcntl.F_SEAL_SHRINK), "may shrink"),
+        (FRAME.encode(), lambda: memory(seals=SEALED & ~fcntl.F_SEAL_WRITE), "or change"),
         (FRAME.encode(), lambda: memory(size=23), "24 bytes in memory of 23"),
         (encode_text(Kind.PROBLEM, "x"), memory, "descriptor without a frame"),
     ],

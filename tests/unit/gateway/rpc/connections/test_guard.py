@@ -1,5 +1,7 @@
 """Which connections the guard throttles, and which it cuts off: pending ones that have sent too much."""
 
+import time
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -11,12 +13,14 @@ from gateway.rpc.connections.admission import Admission
 from gateway.rpc.connections.guard import (
     OVERRUN_BYTES,
     PENDING_BYTES,
+    PLACED_BYTES_PER_S,
     THROTTLED_BYTES_PER_S,
     UNTHROTTLED_BYTES,
     ConnectionGuard,
 )
 from gateway.rpc.connections.packet_filter import ConnectPolicy
 from gateway.rpc.connections.shedding import BURST, RAISE_FACTOR
+from tests.support.clock import Clock
 
 STRANGER, OPERATOR = "10.0.0.1:1000", "10.0.0.2:1000"
 NEIGHBOUR = "10.0.0.2:2000"
@@ -62,10 +66,10 @@ class Sockets:
 class Ground:
     """A guard, an account with an operator in it, and connections without a kernel."""
 
-    def __init__(self, *, mutes: bool = True) -> None:
+    def __init__(self, *, mutes: bool = True, clock: Callable[[], float] = time.monotonic) -> None:
         self.admission = Admission(LimitSettings())
         self.sockets = Sockets(mutes=mutes)
-        self.guard = ConnectionGuard(self.admission)
+        self.guard = ConnectionGuard(self.admission, clock)
         self.admit(OPERATOR)
 
     def admit(self, address: str) -> None:
@@ -194,3 +198,35 @@ def test_where_the_kernel_does_not_permit_it_no_address_is_blocked() -> None:
     ground.look()
     assert ground.sockets.closed == [STRANGER]
     assert len(ground.guard.policy.blocked) == 0
+
+
+def test_a_caller_that_sends_too_much_in_a_second_is_throttled_until_it_sends_less() -> None:
+    clock = Clock()
+    ground = Ground(clock=clock)
+    ground.look()
+    ground.look(OPERATOR=PLACED_BYTES_PER_S)
+    assert ground.sockets.throttled == []
+    ground.look(OPERATOR=PLACED_BYTES_PER_S + 1)
+    ground.look(OPERATOR=2 * PLACED_BYTES_PER_S)
+    throttled, released = (OPERATOR, THROTTLED_BYTES_PER_S), (OPERATOR, UNLIMITED)
+    assert ground.sockets.throttled == [throttled], "at once, and once"
+    clock.now_s += 1
+    ground.look(OPERATOR=3 * PLACED_BYTES_PER_S)
+    clock.now_s += 1
+    ground.look(OPERATOR=4 * PLACED_BYTES_PER_S)
+    assert ground.sockets.throttled == [throttled, released]
+    for second in range(5, 20):
+        clock.now_s += 1
+        ground.look(OPERATOR=second * PLACED_BYTES_PER_S)
+    assert ground.sockets.throttled == [throttled, released]
+
+
+def test_a_caller_whose_calls_flood_is_muted_and_others_at_its_address_are_not_blocked(
+    ground: Ground,
+) -> None:
+    ground.look()
+    ground.admission.note_flood(OPERATOR)
+    ground.look()
+    ground.look()
+    assert ground.sockets.muted == [OPERATOR]
+    assert ground.guard.policy.blocked == frozenset()

@@ -19,6 +19,9 @@ from gateway.rpc.interceptors.audit import Audit, AuditStart
 from gateway.rpc.interceptors.validation import Validation
 from gateway.status.event import ControlAction, ControlResult, Event
 from gateway.status.fault import Severity
+from gateway.status.teleop import DriveEpisode
+from gateway.teleop.episodes import Episodes
+from gateway.teleop.lease import Driver
 from omniseer.gateway.v1.preview_pb2 import PREVIEW_PROFILE_LOW_BW
 from omniseer.gateway.v1.robot_gateway_pb2 import SetPreviewModeRequest, SetPreviewModeResponse
 from tests.support.calls import call_of, serve
@@ -311,3 +314,42 @@ async def test_long_texts_are_shortened() -> None:
     ground = Ground()
     await ground.call(SetPreviewModeResponse(message="x" * 5000))
     assert len(ground.records.events[0].message) < 600
+
+
+def test_holds_without_end_are_folded_and_nobody_loses_what_was_moved() -> None:
+    """Sixty a second, as the pacing passes them: they must not displace what others did."""
+    ground = Ground()
+    episodes = Episodes(ground.audit)
+    episodes.note(Driver("anna", "anna", "10.0.0.9:4711", "operator", "cafe01"), "gamepad")
+    episodes.note(Driver("ben", "ben", "10.0.0.8:4711", "operator", "cafe02"), "keyboard")
+    for number in range(3600):
+        ended_ns = time.monotonic_ns()
+        driver = "anna" if number else "ben"
+        ended = DriveEpisode(number, driver, ended_ns - 100_000_000, ended_ns, 0.01, 0.1, "released")
+        episodes.record("process", ended)
+    ground.audit.record_all()
+    records = ground.records.actions
+    assert len(records) <= 2 * BURST
+    assert sum(each.count for each in records) == 3600
+    assert [(each.who, each.request) for each in records[:2]] == [
+        ("ben", "0.1 s, 0.01 m, 6 deg, by keyboard"),
+        ("anna", "0.1 s, 0.01 m, 6 deg, by gamepad"),
+    ]
+    fold = records[-1]
+    assert (fold.who, fold.answer, fold.credential) == ("anna", "released", "cafe01")
+    assert fold.count == 3599 - BURST
+    assert fold.request == f"{0.1 * fold.count:.1f} s, {0.01 * fold.count:.2f} m, 20563 deg, by gamepad"
+
+
+def test_motions_take_no_record_of_calls() -> None:
+    ground = Ground()
+    episodes = Episodes(ground.audit)
+    episodes.note(Driver("anna", "anna", "10.0.0.9:4711", "operator", "cafe01"), "gamepad")
+    for number in range(2 * BURST):
+        ended_ns = time.monotonic_ns()
+        reason = f"reason {number % 12}"
+        episodes.record("process", DriveEpisode(number, "anna", ended_ns - 1000, ended_ns, 0.5, 0.0, reason))
+    ground.audit.record_all()
+    records = ground.records.actions
+    metres = [float(re.findall(r"([\d.]+) m", each.request)[0]) for each in records]
+    assert sum(metres) == pytest.approx(0.5 * 2 * BURST), "also of kinds that share a fold"

@@ -24,7 +24,7 @@ from gateway.rpc.calls.call import CallContext
 from gateway.rpc.connections.admission import Admission
 from gateway.rpc.connections.refusal_delay import REFUSAL_DELAY_S, REFUSAL_SPACING_S, RefusalDelay
 from gateway.rpc.interceptors.auth import Auth
-from tests.support.calls import serve
+from tests.support.calls import call_of, serve
 from tests.support.virtual_time import in_virtual_time
 
 
@@ -235,3 +235,17 @@ async def test_while_the_list_is_unreadable_no_credential_is_accepted(ground: Gr
         await serve([ground.auth], "WatchSystemStatus", answers, token=ground.tokens["anna"].text())
     assert seen.value.reason is Reason.CREDENTIALS_UNREADABLE
     assert ground.renewals == 1
+
+
+async def test_it_knows_at_once_who_shows_a_valid_token(ground: Ground) -> None:
+    """Without a look at the files, and without a failure that counts."""
+    right, other = (ground.tokens[name] for name in ("anna", "ben"))
+    guess = Token(right.credential_id, other.secret)
+    for _ in range(2 * FREE_FAILURES):
+        assert not ground.auth.knows(call_of(token=guess.text()))
+    for token in (None, "", "no token", new_token("f" * 12).text()):
+        assert not ground.auth.knows(call_of(token=token))
+    assert ground.auth.knows(call_of(token=right.text()))
+    ground.revoke("anna")
+    assert not ground.auth.knows(call_of(token=right.text()))
+    assert ground.looks == 0

@@ -250,3 +250,34 @@ def test_a_stop_is_never_refused_and_takes_nothing_from_others() -> None:
             assert limit.on_call(call_of("StopRobot", peer=peer, service=TELEOP.full_name)) is None
     with pytest.raises(TooMuchError):
         none_left.take_token(peer_of("a"))
+
+
+def test_a_stop_of_an_unknown_caller_takes_a_token() -> None:
+    admission = Admission(LimitSettings(requests_per_s=1, burst=1), Clock())
+    limit = RateLimit(admission, RefusalDelay(), admits=False)
+    stop = call_of("StopRobot", peer="ipv4:10.1.1.97:1", service=TELEOP.full_name)
+    stop.unlimited = False
+    assert limit.on_call(stop) is None
+    with pytest.raises(TooMuchError):
+        admission.take_token(peer_of("a"))
+
+
+def test_one_caller_may_have_its_connections_and_no_more_wherever_they_come_from(clock: Clock) -> None:
+    admission = Admission(LimitSettings(connections_per_caller=2), clock)
+
+    def admit(address: str, caller: str) -> None:
+        admission.take_token(peer_of(address))
+        admission.admit(peer_of(address), caller)
+
+    admit("ipv4:10.0.0.5:1", "ben")
+    admit("ipv4:10.0.0.6:1", "ben")
+    with pytest.raises(TooMuchError, match="connections of ben") as seen:
+        admit("ipv4:10.0.0.7:1", "ben")
+    assert seen.value.reason is Reason.TOO_MANY_CONNECTIONS
+    admit("ipv4:10.0.0.5:2", "anna")
+    admission.open_stream(peer_of("ipv4:10.0.0.5:1"))
+    clock.now_s += QUIET_AFTER_S
+    admit("ipv4:10.0.0.7:1", "ben")
+    assert admission.is_pending(peer_of("ipv4:10.0.0.6:1")), "the quiet one gave way"
+    admission.dismiss(peer_of("ipv4:10.0.0.7:1"))
+    admit("ipv4:10.0.0.8:1", "ben")

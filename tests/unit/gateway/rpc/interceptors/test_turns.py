@@ -142,10 +142,36 @@ async def test_a_turn_is_not_lost_with_a_caller_that_leaves_as_it_comes(ground: 
     await leave(arrived)
 
 
+async def test_callers_that_leave_together_disturb_no_turn(ground: Ground) -> None:
+    """As when their connection breaks: a turn comes to one that has left and does not know it yet."""
+    arrived = ground.arrive(EXAMINED + 3)
+    await settle()
+    for each in arrived[EXAMINED : EXAMINED + 2]:
+        assert each.task
+        each.task.cancel()
+    arrived[0].refuse()
+    await settle()
+    assert not arrived[-1].waits, "the turn is that of the one that stays"
+    for each in [*arrived[1:EXAMINED], arrived[-1]]:
+        each.refuse()
+    assert vars(ground.turns)["_queues"] == {}
+    assert vars(ground.turns)["_waiting"] == 0
+
+
 async def test_a_stop_never_waits(ground: Ground) -> None:
     arrived = ground.arrive(20)
     assert ground.turns.on_call(call_of("StopRobot", service=TELEOP.full_name)) is None
     await leave(arrived)
+
+
+async def test_a_stop_of_an_unknown_caller_waits_like_any_other_call(ground: Ground) -> None:
+    arrived = ground.arrive(EXAMINED)
+    stop = call_of("StopRobot", service=TELEOP.full_name)
+    stop.unlimited = False
+    stopping = Arrived(ground.turns, stop)
+    await settle()
+    assert stopping.waits
+    await leave([*arrived, stopping])
 
 
 async def test_a_unix_socket_has_no_turns(ground: Ground) -> None:
