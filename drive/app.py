@@ -8,7 +8,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Final
 
-from common.ros_node import ros_node
+from common.ros_node import OwnNode, ros_node
 from common.ros_transport import use_udp
 from drive.base import VelocityPublisher, base
 from drive.config import DriveSettings
@@ -41,7 +41,7 @@ def serve(settings: DriveSettings, config_file: Path | None) -> int:
     path = settings.state_dir / _STOP_FILE
     stop_file = StopFile(path)
     use_udp(settings.state_dir)
-    with ros_node("robot_drive_guard") as node:
+    with ros_node(OwnNode.DRIVE_GUARD) as node:
         velocities = VelocityPublisher(node, settings.outputs, lock_topic=None)
         guard = Guard(command, velocities, settings.on_loss, stop_file, read_stops(path))
         for number in (signal.SIGTERM, signal.SIGINT):

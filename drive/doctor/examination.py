@@ -38,11 +38,11 @@ def examine(config_file: Path | None, *, with_pulse: bool) -> Iterator[Finding]:
 
 def _graph(settings: DriveSettings, state: pb.ActualState | None, *, with_pulse: bool) -> Iterator[Finding]:
     # Late: without ROS 2 the rest is still examined.
-    from common.ros_node import middleware_name, ros_node  # noqa: PLC0415
+    from common.ros_node import OwnNode, middleware_name, ros_node  # noqa: PLC0415
     from drive.doctor.graph import look, pulse  # noqa: PLC0415
 
     yield from transport_finding(middleware_name())
-    with ros_node("robot_drive_doctor") as node:
+    with ros_node(OwnNode.DRIVE_DOCTOR) as node:
         yield from graph_findings(look(node, settings))
         if not with_pulse:
             return

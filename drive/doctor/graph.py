@@ -6,9 +6,11 @@ from typing import Any, Final
 
 from rclpy.executors import SingleThreadedExecutor
 
-from drive.base import OBSERVERS, VelocityPublisher, is_still, newest, subscribe, velocity_of
+from common.ros_node import OWN_NODES
+from drive.base import VelocityPublisher
 from drive.config import DriveSettings
 from drive.doctor.facts import GraphFacts, PulseFacts, TopicFacts
+from drive.subscriptions import is_still, newest, subscribe, velocity_of
 from drive.values import ZERO, Velocity
 
 DISCOVERY_S: Final = 3.0
@@ -110,7 +112,7 @@ def _topic(node: Any, name: str, type_name: str) -> TopicFacts:
 
 
 def _foreign(found: list[Any]) -> list[Any]:
-    return [each for each in found if each.node_name not in OBSERVERS]
+    return [each for each in found if each.node_name not in OWN_NODES]
 
 
 def _configured(settings: DriveSettings) -> dict[str, float]:

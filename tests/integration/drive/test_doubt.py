@@ -12,6 +12,7 @@ from typing import Any
 import psutil
 import pytest
 
+from common.ros_node import OwnNode, message_class, ros_node
 from omniseer.drive.v1 import drive_pb2 as pb
 from tests.support.drive_peer import Instants
 from tests.support.driving import Driving, driving
@@ -108,6 +109,19 @@ def test_without_a_base_nothing_is_driven(tmp_path: Path, ros_domain: int) -> No
             lambda: state if pb.INHIBIT_BASE_ABSENT in (state := robot.state()).inhibits else None, "no base"
         )
         assert "nothing takes the velocities on /cmd_vel_keyboard" in state.problems
+
+
+def test_a_recorder_of_our_own_is_no_base(tmp_path: Path, ros_domain: int) -> None:  # noqa: ARG001
+    stamped = message_class("geometry_msgs/msg/TwistStamped")
+    with driving(tmp_path) as robot, ros_node(OwnNode.RECORDER) as recorder:
+        recorder.create_subscription(stamped, "/cmd_vel_keyboard", print, 10)
+        robot.drive()
+        robot.robot.process.terminate()
+        robot.robot.process.wait(10)
+        later_ns = time.monotonic_ns() + 1_500_000_000
+        wait_until(lambda: robot.state().monotonic_ns > later_ns, "several looks at the graph")
+        assert pb.INHIBIT_BASE_ABSENT in robot.state().inhibits
+        assert list(robot.state().problems) == ["nothing takes the velocities on /cmd_vel_keyboard"]
 
 
 def test_autonomy_has_the_robot_before_and_after(robot: Driving) -> None:
