@@ -39,6 +39,7 @@ class OwnNode(StrEnum):
     DRIVE = "robot_drive"
     DRIVE_GUARD = "robot_drive_guard"
     DRIVE_DOCTOR = "robot_drive_doctor"
+    DRIVE_PULSE = "robot_drive_pulse"
     RECORDER = "robot_recorder"
     TAP = "robot_camera_tap"
     TAP_DOCTOR = "robot_tap_doctor"

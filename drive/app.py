@@ -23,7 +23,6 @@ from drive.worker import Worker, new_instance_id
 
 _log = logging.getLogger(__name__)
 
-_STOP_FILE: Final = "stop.json"
 _WORKER_PRIORITY: Final = 10
 _GUARD_PRIORITY: Final = 11
 """Above the worker's, which it has to end."""
@@ -38,7 +37,7 @@ def serve(settings: DriveSettings, config_file: Path | None) -> int:
     command = [sys.executable, "-m", "drive.cli", "worker"]
     if config_file:
         command += ["--config", str(config_file)]
-    path = settings.state_dir / _STOP_FILE
+    path = settings.stop_path
     stop_file = StopFile(path)
     use_udp(settings.state_dir)
     with ros_node(OwnNode.DRIVE_GUARD) as node:
@@ -94,6 +93,6 @@ def _keep_loss(settings: DriveSettings, state: State) -> None:
         reason = "the guard of robot-drive was lost while a driver had the robot"
         latch = Latch(state.last_stop_id + 1, "robot-drive", reason)
     if latch:
-        stop_file = StopFile(settings.state_dir / _STOP_FILE)
+        stop_file = StopFile(settings.stop_path)
         stop_file.keep(Stops(latch.stop_id, latch))
         stop_file.close()

@@ -104,6 +104,11 @@ class DriveSettings(Settings):
     """Keeps a stop over a restart; made this user's own."""
 
     @property
+    def stop_path(self) -> Path:
+        """The file that keeps a stop over a restart."""
+        return self.state_dir / "stop.json"
+
+    @property
     def rules(self) -> Rules:
         """The settings as the machine takes them."""
         limits = self.limits.model_dump(exclude={"release_ramp_s"})

@@ -189,6 +189,14 @@ def timeout_finding(check: str, timeout_s: float | None, source: str) -> Finding
 
 def pulse_findings(facts: PulseFacts) -> Iterator[Finding]:
     """Yields what a test pulse has shown."""
+    if facts.interrupted:
+        yield note(
+            "pulse",
+            f"the pulse {facts.interrupted}",
+            "The robot is moved only where no one and nothing forbids it",
+            "Try again when driving is enabled, no driver has the robot, and no stop is in force",
+        )
+        return
     if facts.fastest_mps is None:
         yield wrong(
             "pulse",
