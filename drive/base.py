@@ -9,6 +9,7 @@ from rclpy.duration import Duration
 
 from common.ros_node import OWN_NODES, OwnNode, message_class, ros_node
 from drive.config import DriveSettings, Output
+from drive.other_sources import OtherSources
 from drive.outranking import Outranking
 from drive.stop_input import StopInput
 from drive.subscriptions import NEWEST, is_still, newest, subscribe, velocity_of
@@ -131,6 +132,10 @@ class Base:
         self._odometry = (
             subscribe(node, "nav_msgs/msg/Odometry", settings.odometry) if settings.odometry else None
         )
+        watched = (*settings.outputs, *((settings.mux_output,) if settings.mux_output else ()))
+        self._other_sources = OtherSources(
+            node, [output.topic for output in settings.outputs], {each.topic for each in watched}
+        )
         self._stops = [StopInput(node, topic) for topic in settings.stop_topics]
         self._problems: list[str] = []
         self._still: tuple[int, bool] | None = None
@@ -167,6 +172,8 @@ class Base:
             base_present=not self._problems,
             outranked=self._outranking.outranked(now_ns) if self._outranking else False,
             still=self._still[1] if self._still and fresh else None,
+            sources_known=self._other_sources.known(now_ns),
+            commanded_on=self._other_sources.commanding(now_ns),
         )
 
 

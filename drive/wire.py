@@ -6,7 +6,7 @@ from typing import Final
 from google.protobuf.message import DecodeError
 
 from drive.episode import Episode
-from drive.machine import Enable, EndLease, Event, GrantLease, Reset, Rules, State, Stop
+from drive.machine import Enable, EndLease, Event, GrantLease, Reset, Rules, State, Stop, reset_obstacle
 from drive.phases import RESTING, Phase
 from drive.shaping import supervised_limit_mps
 from drive.values import ZERO, Command, Inhibit, Latch, Lease, LeaseEnd, Supervision, Velocity
@@ -141,6 +141,7 @@ def actual_state(
         speed_limit_mps=_speed_limit_mps(state, rules, now_ns),
         counters=counters,
         problems=problems,
+        reset_obstacle=reset_obstacle(state, now_ns) if state.latch else "",
     )
     if command:
         message.newest_sequence, message.command_ns = command.sequence, state.command_ns

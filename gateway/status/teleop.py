@@ -114,6 +114,7 @@ class DriveActual:
         velocity: published.
         problems: of the base, for people.
         base_timeout_ms: silence after which the base stops by itself; None if it is not known.
+        reset_obstacle: what keeps the stop from being reset, for people; empty when nothing does.
     """
 
     instance_id: str
@@ -130,6 +131,7 @@ class DriveActual:
     episode: DriveEpisode | None = None
     problems: tuple[str, ...] = ()
     base_timeout_ms: int | None = None
+    reset_obstacle: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -216,5 +216,6 @@ def report_from(welcome: pb.Welcome, message: pb.ActualState) -> DriveReport:
         counters=same_fields(DriveCounters, message.counters),
         episode=same_fields(DriveEpisode, message.episode) if message.HasField("episode") else None,
         problems=tuple(message.problems),
+        reset_obstacle=message.reset_obstacle,
         base_timeout_ms=welcome.base_timeout_ms if welcome.HasField("base_timeout_ms") else None,
     )

@@ -145,6 +145,38 @@ def test_autonomy_has_the_robot_before_and_after(robot: Driving) -> None:
         robot.robot.change(commander="nobody", speed_mps=0.0)
 
 
+def test_a_reset_does_not_leave_the_robot_to_autonomy_that_goes_on(robot: Driving) -> None:
+    peer = robot.ready()
+    robot.robot.change(commander="autonomy", speed_mps=0.2, turn_rad_s=0)
+    try:
+        wait_until(robot.witness.moves, "autonomy drives")
+        peer.send(stop="ben")
+        robot.phase_is("STOPPED")
+        robot.settled()
+        state = robot.state()
+        assert "motion on /cmd_vel_autonomy" in state.reset_obstacle
+        peer.send(reset=state.stop.stop_id)
+        began_ns = time.monotonic_ns()
+        wait_until(lambda: robot.state().monotonic_ns > began_ns + 1_000_000_000, "a second")
+        assert robot.state().phase == pb.PHASE_STOPPED
+        assert not robot.witness.motion_since(began_ns)
+        peer.send(lease="anna", held=False)
+        wait_until(lambda: not robot.state().reset_obstacle, "a driver keeps it away")
+        peer.send(reset=state.stop.stop_id)
+        robot.phase_is("ARMED")
+        assert not robot.witness.motion_since(began_ns)
+        peer.send(stop="ben")
+        robot.phase_is("STOPPED")
+        peer.send(end="CLOSED")
+        robot.robot.change(commander="nobody", speed_mps=0.0)
+        wait_until(lambda: not robot.state().reset_obstacle, "autonomy is silent")
+        peer.send(reset=robot.state().stop.stop_id)
+        robot.phase_is("AVAILABLE")
+        assert not robot.witness.motion_since(began_ns)
+    finally:
+        robot.robot.change(commander="nobody", speed_mps=0.0)
+
+
 def _send(**line: Any) -> Callable[[Driving], None]:
     def send(robot: Driving) -> None:
         assert robot.peer
