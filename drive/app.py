@@ -67,7 +67,15 @@ def work(settings: DriveSettings) -> None:
         base(settings) as robot_base,
         Endpoint(settings.socket, welcome(new_instance_id(), rules, settings.base_timeout_ms)) as endpoint,
     ):
-        worker = Worker(robot_base, endpoint, heartbeats, rules, state, worker_kills=worker_kills())
+        worker = Worker(
+            robot_base,
+            endpoint,
+            heartbeats,
+            rules,
+            state,
+            episode=stops.episode,
+            worker_kills=worker_kills(),
+        )
 
         def stop(_number: int, _frame: FrameType | None) -> None:
             worker.stopping = True
@@ -80,19 +88,21 @@ def work(settings: DriveSettings) -> None:
         _log.info("listening on %s", settings.socket)
         worker.run()
     if worker.orphaned:
-        _keep_loss(settings, worker.state)
+        _keep_loss(settings, worker)
 
 
-def _keep_loss(settings: DriveSettings, state: State) -> None:
+def _keep_loss(settings: DriveSettings, worker: Worker) -> None:
     """Has the next start find a stop, where a driver lost the robot by the end of the guard.
 
-    Otherwise the guard keeps stops; it has gone.
+    Otherwise the guard keeps stops, and the motion that is to be recorded; it has gone.
     """
+    state = worker.state
     latch = state.latch
     if latch is None and state.held_last and settings.on_loss is OnLoss.HOLD:
         reason = "the guard of robot-drive was lost while a driver had the robot"
         latch = Latch(state.last_stop_id + 1, "robot-drive", reason)
-    if latch:
+    if latch or worker.unrecorded:
         stop_file = StopFile(settings.stop_path)
-        stop_file.keep(Stops(latch.stop_id, latch))
+        last_id = latch.stop_id if latch else state.last_stop_id
+        stop_file.keep(Stops(last_id, latch, worker.unrecorded))
         stop_file.close()

@@ -107,6 +107,23 @@ def welcome(instance_id: str, rules: Rules, base_timeout_ms: int | None = None) 
     )
 
 
+def episode_of(message: pb.ActualState) -> Episode | None:
+    """Returns the newest time of motion that a worker has reported."""
+    if not message.HasField("episode"):
+        return None
+    episode = message.episode
+    return Episode(
+        episode_id=episode.episode_id,
+        holder=episode.holder,
+        started_ns=episode.started_ns,
+        ended_ns=episode.ended_ns,
+        distance_m=episode.distance_m,
+        turned_rad=episode.turned_rad,
+        ended_by=episode.ended_by,
+        recorded=episode.recorded,
+    )
+
+
 def actual_state(
     state: State,
     rules: Rules,
@@ -174,4 +191,5 @@ def _episode_message(episode: Episode) -> pb.Episode:
         distance_m=episode.distance_m,
         turned_rad=episode.turned_rad,
         ended_by=episode.ended_by,
+        recorded=episode.recorded,
     )

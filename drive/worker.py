@@ -72,6 +72,7 @@ class Worker:
         heartbeats: each carries an ActualState; the guard reads them.
         rules: of the machine.
         state: at the start.
+        episode: of an earlier process, which no gateway has recorded.
         worker_kills: how many before this one the guard has ended.
     """
 
@@ -83,6 +84,7 @@ class Worker:
         rules: Rules,
         state: State,
         *,
+        episode: Episode | None = None,
         worker_kills: int = 0,
     ) -> None:
         self._base = base
@@ -94,7 +96,7 @@ class Worker:
         self._picture = pb.Picture()
         self._picture_ns = 0
         self._counters = pb.Counters(worker_kills=worker_kills)
-        self._episode: Episode | None = None
+        self._episode = episode
         self._cycled_ns = 0
         self._published_ns = 0
         self._reported_ns = 0
@@ -139,6 +141,11 @@ class Worker:
         return self._state
 
     @property
+    def unrecorded(self) -> Episode | None:
+        """A time of motion that has ended, and that no gateway has recorded."""
+        return self._episode if self._episode and self._episode.unrecorded else None
+
+    @property
     def _due_ns(self) -> int:
         """When the next cycle is due: at once after the end of a rest."""
         return self._cycled_ns + (_REST_CYCLE_NS if self._state.phase in RESTING else _CYCLE_NS)
@@ -150,12 +157,19 @@ class Worker:
             self._report(now_ns)
         elif received.WhichOneof("message") == "picture":
             self._picture, self._picture_ns = received.picture, now_ns
+        elif received.WhichOneof("message") == "recorded":
+            self._take_record(received.recorded)
         elif event := wire.event_of(received):
             self._feed(event, now_ns)
             if received.WhichOneof("message") == "desired":
                 self._revision = received.desired.revision
             if received.WhichOneof("message") in _CONFIRMED:
                 self._report(now_ns)
+
+    def _take_record(self, recorded: pb.Recorded) -> None:
+        episode = self._episode
+        if episode and (episode.episode_id, episode.started_ns) == (recorded.episode_id, recorded.started_ns):
+            self._episode = replace(episode, recorded=True)
 
     def _gateway_left(self, now_ns: int) -> None:
         _log.warning("the gateway has gone")
@@ -275,7 +289,17 @@ class Worker:
             return
         for _ in range(_FAREWELL_ZEROS):
             self._base.publish(ZERO, time.monotonic_ns())
+        self._end_episode(time.monotonic_ns())
         self._base.wait_until_acknowledged()
+
+    def _end_episode(self, now_ns: int) -> None:
+        """Reports the end of the motion that this process has ended."""
+        if self._episode is None or self._episode.ended_ns:
+            return
+        self._episode = self._episode.ended(now_ns, "robot-drive was ended")
+        if not self.orphaned:
+            self._beat(now_ns)
+        self._report(now_ns)
 
 
 def _differs(before: State, after: State) -> bool:

@@ -94,7 +94,11 @@ class DriveCounters:
 
 @dataclass(frozen=True, slots=True)
 class DriveEpisode:
-    """A time of motion, from a hold to its end, as commanded; `ended_ns` is 0 while it lasts."""
+    """A time of motion, from a hold to its end, as commanded; `ended_ns` is 0 while it lasts.
+
+    Attributes:
+        recorded: whether it is in the audit log; None of an older drive program, which does not know.
+    """
 
     episode_id: int
     holder: str
@@ -103,6 +107,7 @@ class DriveEpisode:
     distance_m: float
     turned_rad: float
     ended_by: str
+    recorded: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)

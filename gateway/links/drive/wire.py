@@ -164,8 +164,15 @@ class DriveClient:
             case "actual" if self._welcome:
                 self._newest = report = report_from(self._welcome, message.actual)
                 if report.episode and report.episode.ended_ns:
-                    self._episode_ended(report.instance_id, report.episode)
+                    self._take_ended(report.instance_id, report.episode)
         self._changed.set()
+
+    def _take_ended(self, instance_id: str, episode: DriveEpisode) -> None:
+        """Hands a time of motion over, and acknowledges it where the drive program keeps it until then."""
+        self._episode_ended(instance_id, episode)
+        if episode.recorded is False:
+            recorded = pb.Recorded(episode_id=episode.episode_id, started_ns=episode.started_ns)
+            self.send(pb.ToDrive(recorded=recorded))
 
     def _lose(self, error: LinkLostError) -> None:
         if self._lost is None:

@@ -224,6 +224,35 @@ def test_whatever_ends_it_the_last_message_is_zero(robot: Driving, ending: str) 
     assert not robot.witness.moves()
 
 
+LOSSES = {
+    "gateway killed": (_signal("gateway", signal.SIGKILL), "stopped by anna: the driver was lost"),
+    "worker killed": (_signal("worker", signal.SIGKILL), "robot-drive lost its worker"),
+    "worker frozen": (_signal("worker", signal.SIGSTOP), "robot-drive lost its worker"),
+    "ended": (_signal("guard", signal.SIGTERM), "robot-drive was ended"),
+    "guard killed": (_signal("guard", signal.SIGKILL), "robot-drive was ended"),
+}
+
+
+@pytest.mark.parametrize("loss", LOSSES)
+def test_a_motion_that_no_gateway_has_recorded_outlives_the_program(robot: Driving, loss: str) -> None:
+    lose, why = LOSSES[loss]
+    robot.drive()
+    started_ns = robot.state().episode.started_ns
+    lose(robot)
+    robot.settled()
+    assert robot.guard
+    if robot.guard.poll() is not None:
+        wait_until(lambda: robot.observer.state() is None, "the drive program has gone")
+        robot.start()
+    episode = wait_until(
+        lambda: episode if (episode := robot.state().episode).ended_ns else None, "the end of the motion", 30
+    )
+    assert (episode.holder, episode.started_ns, episode.recorded) == ("anna", started_ns, False)
+    assert episode.ended_by.startswith(why)
+    assert 0 < episode.distance_m < 1
+    assert 0 < (episode.ended_ns - episode.started_ns) / 1e9 < 60
+
+
 def test_a_terminal_that_reads_nothing_keeps_no_zero_back(tmp_path: Path, ros_domain: int) -> None:  # noqa: ARG001
     """Standard error is a full pipe: whoever logs there would stand still before the zeros."""
     reader, writer = os.pipe()

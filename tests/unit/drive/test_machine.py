@@ -297,8 +297,8 @@ def test_a_reset_leaves_the_robot_to_no_source_that_goes_on() -> None:
     robot.feed(Observe(replace(CLEAR, commanded_on=("/cmd_vel_nav",))))
     assert "/cmd_vel_nav" in reset_obstacle(robot.state, robot.now_ns)
     assert robot.feed(Reset(robot.stop_id)).latch
-    for doubt in ({"outranked": True}, {"sources_known": False}):
-        robot.feed(Observe(replace(CLEAR, **doubt)))
+    for doubt in (replace(CLEAR, outranked=True), replace(CLEAR, sources_known=False)):
+        robot.feed(Observe(doubt))
         assert robot.feed(Reset(robot.stop_id)).latch
     robot.feed(Observe(CLEAR))
     assert not reset_obstacle(robot.state, robot.now_ns)
