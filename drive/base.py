@@ -11,7 +11,7 @@ from common.ros_node import OWN_NODES, OwnNode, message_class, ros_node
 from drive.config import DriveSettings, Output
 from drive.other_sources import OtherSources
 from drive.outranking import Outranking
-from drive.stop_input import StopInput
+from drive.stop_input import stop_inputs
 from drive.subscriptions import NEWEST, is_still, newest, subscribe, velocity_of
 from drive.values import MS, Surroundings, Velocity
 
@@ -136,7 +136,7 @@ class Base:
         self._other_sources = OtherSources(
             node, [output.topic for output in settings.outputs], {each.topic for each in watched}
         )
-        self._stops = [StopInput(node, topic) for topic in settings.stop_topics]
+        self._stops = stop_inputs(node, settings)
         self._problems: list[str] = []
         self._still: tuple[int, bool] | None = None
 
@@ -156,7 +156,7 @@ class Base:
 
     def problems(self) -> list[str]:
         """Returns what was missing when last observed, for people."""
-        return self._problems
+        return [*self._problems, *(stop.problem for stop in self._stops if stop.problem)]
 
     def observed(self, now_ns: int) -> Surroundings:
         """Takes what has arrived; returns what it says. The preview's part is the gateway's to say."""
@@ -168,7 +168,7 @@ class Base:
         fresh = self._still is not None and now_ns - self._still[0] <= _ODOMETRY_NS
         return Surroundings(
             # All are asked, so that each takes what has arrived.
-            robot_stopped=any([stop.active() for stop in self._stops]),  # noqa: C419
+            robot_stopped=any([stop.active(now_ns) for stop in self._stops]),  # noqa: C419
             base_present=not self._problems,
             outranked=self._outranking.outranked(now_ns) if self._outranking else False,
             still=self._still[1] if self._still and fresh else None,

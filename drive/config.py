@@ -88,6 +88,8 @@ class DriveSettings(Settings):
     """A std_msgs/Bool that locks the multiplexer, for stops. None: zeros alone."""
     stop_topics: tuple[Topic, ...] = Field(default=(), max_length=8)
     """std_msgs/Bool of the robot's own stop buttons: true forbids motion."""
+    stop_timeout_ms: int | None = Field(default=None, ge=50, le=60_000)
+    """Silence on a stop topic that counts as pressed. None: its publisher need not repeat itself."""
     mux_output: MuxOutput | None = MuxOutput()
     """Compared with what is commanded here. None: not known."""
     base_timeout_ms: int | None = Field(default=None, ge=20, le=60_000)

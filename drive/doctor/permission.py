@@ -10,7 +10,7 @@ from common.ros_node import OwnNode
 from drive.client import StateReader
 from drive.config import DriveSettings
 from drive.stop_file import read_stops
-from drive.stop_input import StopInput
+from drive.stop_input import stop_inputs
 from drive.values import MS
 from omniseer.drive.v1 import drive_pb2 as pb
 
@@ -28,7 +28,7 @@ class Permission:
 
     def __init__(self, node: Any, settings: DriveSettings) -> None:
         self._node, self._settings = node, settings
-        self._stops = [(topic, StopInput(node, topic)) for topic in settings.stop_topics]
+        self._stops = stop_inputs(node, settings)
         self._state: pb.ActualState | None = None
         self._program: StateReader | None = None
         self._refusal = ""
@@ -55,7 +55,8 @@ class Permission:
     def refusal(self) -> str:
         """Returns why the robot must not be moved at this instant, for people; empty if it may be."""
         # All are asked, so that each takes what has arrived.
-        pressed = [topic for topic, stop in self._stops if stop.active()]
+        now_ns = time.monotonic_ns()
+        pressed = [stop.topic for stop in self._stops if stop.active(now_ns)]
         self._read_program()
         if self._refusal:
             return self._refusal
