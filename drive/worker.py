@@ -11,6 +11,7 @@ import time
 from dataclasses import replace
 from typing import Final, Protocol
 
+from common.suspend import SuspendWatch
 from drive import wire
 from drive.endpoint import Endpoint, Peer, Received
 from drive.episode import Episode, followed
@@ -97,6 +98,7 @@ class Worker:
         self._picture_ns = 0
         self._counters = pb.Counters(worker_kills=worker_kills)
         self._episode = episode
+        self._suspends = SuspendWatch()
         self._cycled_ns = 0
         self._published_ns = 0
         self._reported_ns = 0
@@ -124,7 +126,12 @@ class Worker:
         """Waits for a message, the next cycle, or the end of the command's validity, and acts on it."""
         expires_ns, expected_ns = self._state.expires_ns, self._due_ns
         until_ns = expected_ns if expires_ns is None else min(expected_ns, expires_ns)
-        for received in self._endpoint.wait((until_ns - time.monotonic_ns()) / 1e9):
+        arrived = self._endpoint.wait((until_ns - time.monotonic_ns()) / 1e9)
+        if self._suspends.resumed():
+            # First: what has arrived may be as old as the suspend is long.
+            _log.warning("the computer was suspended: a driver counts as lost")
+            self._lose_driver(time.monotonic_ns())
+        for received in arrived:
             self._take(received, time.monotonic_ns())
         now_ns, due_ns = time.monotonic_ns(), self._due_ns
         if now_ns >= due_ns:
@@ -174,6 +181,9 @@ class Worker:
     def _gateway_left(self, now_ns: int) -> None:
         _log.warning("the gateway has gone")
         self._picture = pb.Picture()
+        self._lose_driver(now_ns)
+
+    def _lose_driver(self, now_ns: int) -> None:
         if lease := self._state.lease:
             self._feed(EndLease(lease.session_id, LeaseEnd.LOST), now_ns)
 

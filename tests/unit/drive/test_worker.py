@@ -2,6 +2,7 @@
 
 import socket
 from collections import deque
+from itertools import chain, repeat
 from types import SimpleNamespace
 from typing import Any
 
@@ -164,6 +165,20 @@ def test_a_gateway_that_goes_takes_the_lease_with_it(world: World) -> None:
     beats = [what for kind, what, _ in world.journal if kind == "beat"]
     assert beats[-1].phase == pb.PHASE_AVAILABLE
     assert beats[-1].session_id == ""
+
+
+def test_a_suspend_loses_the_driver_before_what_has_arrived_counts(world: World) -> None:
+    world.drives()
+    once = chain([True], repeat(False))
+    world.worker._suspends = SimpleNamespace(  # type: ignore[assignment]
+        resumed=lambda: world.now_ns >= START_NS + 150 * MS and next(once)
+    )
+    world.end(400)
+    world.worker.run()
+    assert world.moving()
+    assert max(world.moving()) < 150
+    assert world.worker.state.latch
+    assert "the driver was lost" in world.worker.state.latch.reason
 
 
 def test_the_last_is_zero_when_the_loop_fails(world: World) -> None:
