@@ -28,7 +28,7 @@ class Reason(StrEnum):
     DRIVE_UNREACHABLE = "DRIVE_UNREACHABLE"
     """The robot's drive program does not answer."""
     STOP_NOT_RESET = "STOP_NOT_RESET"
-    """The stop that was to be reset is not the present one, or the driver holds."""
+    """The stop that was to be reset is not the present one, or the robot might move by its reset."""
     RECORDING_NOT_CONFIGURED = "RECORDING_NOT_CONFIGURED"
     """The robot is not set up for recording."""
     RECORDER_UNREACHABLE = "RECORDER_UNREACHABLE"

@@ -7,10 +7,11 @@ handlers, no log files, none of the services of an ordinary node.
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from enum import StrEnum
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from common.errors import UserError
 from common.ros_environment import check_domain
@@ -28,6 +29,23 @@ except ImportError as error:
         f"ROS 2 can't be used from Python ({error})",
         "Type: scripts/setup, or source the setup.bash of a ROS 2 installation first",
     ) from error
+
+
+class OwnNode(StrEnum):
+    """The nodes of this project's programs. They may take velocities to look at them; none moves by them."""
+
+    GATEWAY = "robot_gateway"
+    GATEWAY_DOCTOR = "robot_gateway_doctor"
+    DRIVE = "robot_drive"
+    DRIVE_GUARD = "robot_drive_guard"
+    DRIVE_DOCTOR = "robot_drive_doctor"
+    DRIVE_PULSE = "robot_drive_pulse"
+    RECORDER = "robot_recorder"
+    TAP = "robot_camera_tap"
+    TAP_DOCTOR = "robot_tap_doctor"
+
+
+OWN_NODES: Final = frozenset(OwnNode)
 
 
 class TypeMissingError(Exception):

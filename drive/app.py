@@ -8,7 +8,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Final
 
-from common.ros_node import ros_node
+from common.ros_node import OwnNode, ros_node
 from common.ros_transport import use_udp
 from drive.base import VelocityPublisher, base
 from drive.config import DriveSettings
@@ -23,7 +23,6 @@ from drive.worker import Worker, new_instance_id
 
 _log = logging.getLogger(__name__)
 
-_STOP_FILE: Final = "stop.json"
 _WORKER_PRIORITY: Final = 10
 _GUARD_PRIORITY: Final = 11
 """Above the worker's, which it has to end."""
@@ -38,10 +37,10 @@ def serve(settings: DriveSettings, config_file: Path | None) -> int:
     command = [sys.executable, "-m", "drive.cli", "worker"]
     if config_file:
         command += ["--config", str(config_file)]
-    path = settings.state_dir / _STOP_FILE
+    path = settings.stop_path
     stop_file = StopFile(path)
     use_udp(settings.state_dir)
-    with ros_node("robot_drive_guard") as node:
+    with ros_node(OwnNode.DRIVE_GUARD) as node:
         velocities = VelocityPublisher(node, settings.outputs, lock_topic=None)
         guard = Guard(command, velocities, settings.on_loss, stop_file, read_stops(path))
         for number in (signal.SIGTERM, signal.SIGINT):
@@ -68,7 +67,15 @@ def work(settings: DriveSettings) -> None:
         base(settings) as robot_base,
         Endpoint(settings.socket, welcome(new_instance_id(), rules, settings.base_timeout_ms)) as endpoint,
     ):
-        worker = Worker(robot_base, endpoint, heartbeats, rules, state, worker_kills=worker_kills())
+        worker = Worker(
+            robot_base,
+            endpoint,
+            heartbeats,
+            rules,
+            state,
+            episode=stops.episode,
+            worker_kills=worker_kills(),
+        )
 
         def stop(_number: int, _frame: FrameType | None) -> None:
             worker.stopping = True
@@ -81,19 +88,21 @@ def work(settings: DriveSettings) -> None:
         _log.info("listening on %s", settings.socket)
         worker.run()
     if worker.orphaned:
-        _keep_loss(settings, worker.state)
+        _keep_loss(settings, worker)
 
 
-def _keep_loss(settings: DriveSettings, state: State) -> None:
+def _keep_loss(settings: DriveSettings, worker: Worker) -> None:
     """Has the next start find a stop, where a driver lost the robot by the end of the guard.
 
-    Otherwise the guard keeps stops; it has gone.
+    Otherwise the guard keeps stops, and the motion that is to be recorded; it has gone.
     """
+    state = worker.state
     latch = state.latch
     if latch is None and state.held_last and settings.on_loss is OnLoss.HOLD:
         reason = "the guard of robot-drive was lost while a driver had the robot"
         latch = Latch(state.last_stop_id + 1, "robot-drive", reason)
-    if latch:
-        stop_file = StopFile(settings.state_dir / _STOP_FILE)
-        stop_file.keep(Stops(latch.stop_id, latch))
+    if latch or worker.unrecorded:
+        stop_file = StopFile(settings.stop_path)
+        last_id = latch.stop_id if latch else state.last_stop_id
+        stop_file.keep(Stops(last_id, latch, worker.unrecorded))
         stop_file.close()

@@ -1,7 +1,4 @@
-"""The robot's base as the ROS 2 graph shows it; with `drive.doctor.graph` the only one here that uses rclpy.
-
-Nothing spins: the worker takes the newest messages in its own cycle, as the gateway does.
-"""
+"""The robot's base as the ROS 2 graph shows it, and the publisher of its velocities."""
 
 import logging
 from collections.abc import Iterator, Sequence
@@ -9,37 +6,17 @@ from contextlib import contextmanager
 from typing import Any, Final
 
 from rclpy.duration import Duration
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from common.ros_node import message_class, ros_node
+from common.ros_node import OWN_NODES, OwnNode, message_class, ros_node
 from drive.config import DriveSettings, Output
+from drive.other_sources import OtherSources
 from drive.outranking import Outranking
+from drive.stop_input import stop_inputs
+from drive.subscriptions import NEWEST, is_still, newest, subscribe, velocity_of
 from drive.values import MS, Surroundings, Velocity
 
 _log = logging.getLogger(__name__)
 
-OBSERVERS: Final = frozenset(
-    {"robot_drive", "robot_drive_guard", "robot_drive_doctor", "robot_gateway", "robot_gateway_doctor"}
-)
-"""Nodes of this project: they look at velocities, and move nothing by them."""
-NEWEST: Final = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST,
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.VOLATILE,
-)
-BEST_EFFORT: Final = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST, depth=1, reliability=ReliabilityPolicy.BEST_EFFORT
-)
-"""Matches publishers of either reliability."""
-_LATCHED: Final = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST,
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
-_STILL_MPS: Final = 0.02
-_STILL_RAD_S: Final = 0.05
 _ODOMETRY_NS: Final = 500 * MS
 """Older odometry says nothing about now."""
 _LOOK_EVERY_NS: Final = 500 * MS
@@ -137,28 +114,7 @@ class _Takers:
             # A program that announces a name that is no text; then all that is known is their number.
             _log.debug("the subscribers of %s can't be listed: %s", topic, error)
             return 0
-        return sum(each.node_name in OBSERVERS for each in found)
-
-
-class _StopInput:
-    """The robot's own stop, on one topic. It is active unless a live publisher says that it is not."""
-
-    def __init__(self, node: Any, topic: str) -> None:
-        self._node, self._topic = node, topic
-        # What was published before this program started only reaches a subscription of the same durability.
-        self._subscriptions = [subscribe(node, "std_msgs/msg/Bool", topic, qos) for qos in (NEWEST, _LATCHED)]
-        self._best_effort = subscribe(node, "std_msgs/msg/Bool", topic, BEST_EFFORT)
-        self._released = False
-
-    def active(self) -> bool:
-        """Takes what has arrived; returns whether the stop is active."""
-        taken = [newest(each) for each in (*self._subscriptions, self._best_effort)]
-        said = [bool(message.data) for message in taken if message]
-        if said:
-            self._released = not any(said)
-        if self._node.count_publishers(self._topic) == 0:
-            self._released = False
-        return not self._released
+        return sum(each.node_name in OWN_NODES for each in found)
 
 
 class Base:
@@ -176,7 +132,11 @@ class Base:
         self._odometry = (
             subscribe(node, "nav_msgs/msg/Odometry", settings.odometry) if settings.odometry else None
         )
-        self._stops = [_StopInput(node, topic) for topic in settings.stop_topics]
+        watched = (*settings.outputs, *((settings.mux_output,) if settings.mux_output else ()))
+        self._other_sources = OtherSources(
+            node, [output.topic for output in settings.outputs], {each.topic for each in watched}
+        )
+        self._stops = stop_inputs(node, settings)
         self._problems: list[str] = []
         self._still: tuple[int, bool] | None = None
 
@@ -196,7 +156,7 @@ class Base:
 
     def problems(self) -> list[str]:
         """Returns what was missing when last observed, for people."""
-        return self._problems
+        return [*self._problems, *(stop.problem for stop in self._stops if stop.problem)]
 
     def observed(self, now_ns: int) -> Surroundings:
         """Takes what has arrived; returns what it says. The preview's part is the gateway's to say."""
@@ -208,10 +168,12 @@ class Base:
         fresh = self._still is not None and now_ns - self._still[0] <= _ODOMETRY_NS
         return Surroundings(
             # All are asked, so that each takes what has arrived.
-            robot_stopped=any([stop.active() for stop in self._stops]),  # noqa: C419
+            robot_stopped=any([stop.active(now_ns) for stop in self._stops]),  # noqa: C419
             base_present=not self._problems,
             outranked=self._outranking.outranked(now_ns) if self._outranking else False,
             still=self._still[1] if self._still and fresh else None,
+            sources_known=self._other_sources.known(now_ns),
+            commanded_on=self._other_sources.commanding(now_ns),
         )
 
 
@@ -222,38 +184,5 @@ def base(settings: DriveSettings) -> Iterator[Base]:
     Raises:
         UserError: ROS 2 can't be used, or a message type is not installed.
     """
-    with ros_node("robot_drive") as node:
+    with ros_node(OwnNode.DRIVE) as node:
         yield Base(node, settings)
-
-
-def subscribe(node: Any, type_name: str, topic: str, qos: QoSProfile = BEST_EFFORT) -> Any:
-    """Returns a subscription whose messages `newest` takes."""
-    return node.create_subscription(message_class(type_name), topic, _never_called, qos)
-
-
-def newest(subscription: Any) -> Any | None:
-    """Returns the newest message, None if there is no new one. One that can't be decoded is none."""
-    if subscription is None:
-        return None
-    try:
-        taken = subscription.handle.take_message(subscription.msg_type, False)
-    except Exception as error:  # noqa: BLE001  # whatever a publisher sends must not end the cycle
-        _log.warning("%s: a message can't be read: %s", subscription.topic_name, error)
-        return None
-    return taken[0] if taken else None
-
-
-def velocity_of(message: Any) -> Velocity:
-    """Returns the velocity of a Twist, or of a message that has one (TwistStamped, TwistWithCovariance)."""
-    twist = getattr(message, "twist", message)
-    return Velocity(twist.linear.x, twist.linear.y, twist.angular.z)
-
-
-def is_still(velocity: Velocity) -> bool:
-    """Whether a measured velocity is that of a robot that stands still; NaN is not."""
-    linear_mps = abs(velocity.vx_mps) + abs(velocity.vy_mps)
-    return linear_mps <= _STILL_MPS and abs(velocity.wz_rad_s) <= _STILL_RAD_S
-
-
-def _never_called(_message: Any) -> None:
-    raise AssertionError("no executor spins these subscriptions")

@@ -37,6 +37,17 @@ def worker(config_file: _Config = None) -> None:
     work(settings)
 
 
+@app.command(hidden=True)
+def pulse(config_file: _Config = None) -> None:
+    """Runs the process that moves the robot for `doctor --pulse`, which watches it."""
+    settings = _load(config_file)
+    from drive.doctor.pulse import run_pulse  # noqa: PLC0415
+    from drive.guard import worker_heartbeats  # noqa: PLC0415
+
+    with worker_heartbeats() as heartbeats:
+        run_pulse(settings, heartbeats)
+
+
 @app.command()
 def check(config_file: _Config = None, in_effect: PrintOption = False, schema: SchemaOption = False) -> None:
     """Checks the configuration and exits."""

@@ -88,6 +88,8 @@ class DriveSettings(Settings):
     """A std_msgs/Bool that locks the multiplexer, for stops. None: zeros alone."""
     stop_topics: tuple[Topic, ...] = Field(default=(), max_length=8)
     """std_msgs/Bool of the robot's own stop buttons: true forbids motion."""
+    stop_timeout_ms: int | None = Field(default=None, ge=50, le=60_000)
+    """Silence on a stop topic that counts as pressed. None: its publisher need not repeat itself."""
     mux_output: MuxOutput | None = MuxOutput()
     """Compared with what is commanded here. None: not known."""
     base_timeout_ms: int | None = Field(default=None, ge=20, le=60_000)
@@ -102,6 +104,11 @@ class DriveSettings(Settings):
     a person resets the stop (hold), or other sources of commands have it again (hand_back)."""
     state_dir: Path = Field(default_factory=_default_state_dir)
     """Keeps a stop over a restart; made this user's own."""
+
+    @property
+    def stop_path(self) -> Path:
+        """The file that keeps a stop over a restart."""
+        return self.state_dir / "stop.json"
 
     @property
     def rules(self) -> Rules:

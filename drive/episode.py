@@ -17,6 +17,7 @@ class Episode:
         ended_ns: 0 while it lasts.
         distance_m, turned_rad: as commanded, which is not as measured.
         ended_by: for people; empty while it lasts.
+        recorded: whether it is in the audit log.
     """
 
     episode_id: int
@@ -26,6 +27,16 @@ class Episode:
     distance_m: float = 0.0
     turned_rad: float = 0.0
     ended_by: str = ""
+    recorded: bool = False
+
+    @property
+    def unrecorded(self) -> bool:
+        """Whether it has ended and is still to be recorded."""
+        return self.ended_ns > 0 and not self.recorded
+
+    def ended(self, now_ns: int, why: str) -> "Episode":
+        """Returns it with its end; one that has ended is as it was."""
+        return self if self.ended_ns else replace(self, ended_ns=now_ns, ended_by=why)
 
 
 def followed(last: Episode | None, before: State, after: State, now_ns: int) -> Episode | None:
@@ -42,7 +53,7 @@ def followed(last: Episode | None, before: State, after: State, now_ns: int) -> 
         distance_m=last.distance_m + velocity.linear_mps * elapsed_s,
         turned_rad=last.turned_rad + abs(velocity.wz_rad_s) * elapsed_s,
     )
-    return last if driving else replace(last, ended_ns=now_ns, ended_by=_why(after))
+    return last if driving else last.ended(now_ns, _why(after))
 
 
 def _why(after: State) -> str:

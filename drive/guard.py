@@ -13,6 +13,7 @@ import sys
 import time
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import Final, Protocol
 
 from google.protobuf.message import DecodeError
@@ -20,12 +21,13 @@ from google.protobuf.message import DecodeError
 from common import heartbeat
 from common.backoff import Backoff
 from common.errors import ExitCode
+from drive.episode import Episode
 from drive.machine import OnLoss
 from drive.real_time import delayed_by
 from drive.stop_file import StopFile, Stops
 from drive.values import MS, ZERO, Latch, Velocity
 from drive.watch import Watch
-from drive.wire import RESTING_PHASES
+from drive.wire import RESTING_PHASES, episode_of
 from omniseer.drive.v1 import drive_pb2 as pb
 
 _log = logging.getLogger(__name__)
@@ -88,6 +90,8 @@ class Guard:
         self._on_loss = on_loss
         self._stop_file = stop_file
         self._stops = stops
+        self._episode: Episode | None = None
+        """The newest, as the worker has reported it."""
         self._backoff = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S)
         self._heartbeats = heartbeat.own()
         self._zeros_until_ns = 0
@@ -156,6 +160,8 @@ class Guard:
     def _take_loss(self) -> None:
         """Sends zeros from now on, until the next worker takes over or the robot is handed back."""
         self._velocities.publish(ZERO)
+        if self._episode:
+            self._keep_episode(self._episode.ended(time.monotonic_ns(), "robot-drive lost its worker"))
         if self._end_by_ns is not None:
             self._zeros_until_ns = sys.maxsize  # It said farewell; one more does no harm.
         elif self._on_loss is OnLoss.HAND_BACK and self._stops.latch is None:
@@ -165,7 +171,8 @@ class Guard:
             if self._stops.latch is None:
                 stop_id = self._stops.last_id + 1
                 reason = "its worker was lost while a driver had the robot"
-                self._stops = Stops(stop_id, Latch(stop_id, "robot-drive", reason))
+                latch = Latch(stop_id, "robot-drive", reason)
+                self._stops = replace(self._stops, last_id=stop_id, latch=latch)
                 self._stop_file.keep(self._stops)
 
     def _follow(self, heartbeats: socket.socket, watch: Watch, pid: int) -> str:
@@ -203,7 +210,13 @@ class Guard:
         watch.beat(time.monotonic_ns(), leased=actual.phase not in RESTING_PHASES)
         stop = actual.stop
         latch = Latch(stop.stop_id, stop.by, stop.reason) if actual.HasField("stop") else None
-        self._stops = Stops(max(self._stops.last_id, stop.stop_id), latch)
+        self._stops = replace(self._stops, last_id=max(self._stops.last_id, stop.stop_id), latch=latch)
+        self._keep_episode(episode_of(actual))
+
+    def _keep_episode(self, episode: Episode | None) -> None:
+        """Keeps the stops, and the episode once it has ended, until a gateway has recorded it."""
+        self._episode = episode
+        self._stops = replace(self._stops, episode=episode if episode and episode.unrecorded else None)
         self._stop_file.keep(self._stops)
 
     def _await_end(self, worker: "subprocess.Popen[bytes]") -> None:

@@ -191,6 +191,28 @@ def step(state: State, event: Event, now_ns: int, rules: Rules) -> State:
     return replace(state, output=_output(state, now_ns, rules), output_ns=now_ns)
 
 
+def reset_obstacle(state: State, now_ns: int) -> str:
+    """Returns what keeps the stop from being reset, for people; empty if nothing does.
+
+    A reset never moves the robot: not by its driver's hold, and not by leaving it to a source that has gone
+    on publishing. While a driver has the lease, zeros keep sources of lower priority away.
+    """
+    surroundings = state.surroundings
+    if state.holding(now_ns):
+        return "the driver holds: release first"
+    if state.lease is None and surroundings.commanded_on:
+        topics = ", ".join(surroundings.commanded_on)
+        return (
+            f"another source commands motion on {topics}, and would move the robot: "
+            "end that first, or begin to drive, which keeps it away, and reset the stop then"
+        )
+    if state.lease is None and not surroundings.sources_known:
+        return "it is not known yet, so soon after the start, what else commands the robot: try again in 3 s"
+    if surroundings.outranked:
+        return "another source moves the robot: end that first"
+    return ""
+
+
 def _taken(state: State, event: Event, now_ns: int, rules: Rules) -> tuple[State, Trigger | None]:
     """Returns the state with what the event says, and the trigger that it is."""
     match event:
@@ -202,7 +224,9 @@ def _taken(state: State, event: Event, now_ns: int, rules: Rules) -> tuple[State
             return _lease_ended(state, why, now_ns, rules)
         case Stop(by, reason):
             return _latched(state, by, reason), Trigger.STOP
-        case Reset(stop_id) if state.latch and state.latch.stop_id == stop_id and not state.holding(now_ns):
+        case Reset(stop_id) if (
+            state.latch and state.latch.stop_id == stop_id and not reset_obstacle(state, now_ns)
+        ):
             return replace(state, latch=None, command=None), Trigger.RESET
         case _:
             return _informed(state, event, now_ns, rules.deadlines), None

@@ -1,8 +1,8 @@
-"""A stop that outlives the program, and the number of the last one: one small file.
+"""What outlives the program, in one small file: a stop, the number of the last one, an unrecorded motion.
 
 A latched stop may have locked the robot's multiplexer, which stays locked when the program ends; and a person
 who stops the robot does not mean "until the next restart". Numbers go on, so that a reset of an old stop
-never meets a new one.
+never meets a new one. A time of motion stays until a gateway has recorded it.
 """
 
 import json
@@ -14,6 +14,7 @@ from typing import Any, Final
 
 from common.errors import UserError
 from common.private_files import make_own_directory, write_private
+from drive.episode import Episode
 from drive.values import Latch
 
 _log = logging.getLogger(__name__)
@@ -28,10 +29,12 @@ class Stops:
     Attributes:
         last_id: number of the newest, reset or not. 0 before the first.
         latch: the stop in force; None without one.
+        episode: a time of motion that has ended and that no gateway has recorded; None without one.
     """
 
     last_id: int = 0
     latch: Latch | None = None
+    episode: Episode | None = None
 
     @classmethod
     def from_json(cls, text: str | bytes) -> "Stops":
@@ -44,7 +47,9 @@ class Stops:
         latch = fields["latch"] and Latch(
             int(fields["latch"]["stop_id"]), str(fields["latch"]["by"]), str(fields["latch"]["reason"])
         )
-        return cls(int(fields["last_id"]), latch or None)
+        # Missing in a file of an earlier release.
+        episode = Episode(**fields["episode"]) if fields.get("episode") else None
+        return cls(int(fields["last_id"]), latch or None, episode)
 
     def as_json(self) -> str:
         """Returns the description for the file and for the worker."""

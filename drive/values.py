@@ -138,6 +138,8 @@ class Surroundings:
         base_present: something takes the velocity commands.
         outranked: the base follows another source although motion is commanded here.
         still: odometry shows no motion; None without odometry.
+        sources_known: what else commands the robot has been discovered.
+        commanded_on: topics on which other sources command motion, whether it reaches the base or not.
     """
 
     preview_running: bool = False
@@ -146,3 +148,5 @@ class Surroundings:
     base_present: bool = False
     outranked: bool = False
     still: bool | None = None
+    sources_known: bool = True
+    commanded_on: tuple[str, ...] = ()

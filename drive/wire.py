@@ -6,7 +6,7 @@ from typing import Final
 from google.protobuf.message import DecodeError
 
 from drive.episode import Episode
-from drive.machine import Enable, EndLease, Event, GrantLease, Reset, Rules, State, Stop
+from drive.machine import Enable, EndLease, Event, GrantLease, Reset, Rules, State, Stop, reset_obstacle
 from drive.phases import RESTING, Phase
 from drive.shaping import supervised_limit_mps
 from drive.values import ZERO, Command, Inhibit, Latch, Lease, LeaseEnd, Supervision, Velocity
@@ -107,6 +107,23 @@ def welcome(instance_id: str, rules: Rules, base_timeout_ms: int | None = None) 
     )
 
 
+def episode_of(message: pb.ActualState) -> Episode | None:
+    """Returns the newest time of motion that a worker has reported."""
+    if not message.HasField("episode"):
+        return None
+    episode = message.episode
+    return Episode(
+        episode_id=episode.episode_id,
+        holder=episode.holder,
+        started_ns=episode.started_ns,
+        ended_ns=episode.ended_ns,
+        distance_m=episode.distance_m,
+        turned_rad=episode.turned_rad,
+        ended_by=episode.ended_by,
+        recorded=episode.recorded,
+    )
+
+
 def actual_state(
     state: State,
     rules: Rules,
@@ -141,6 +158,7 @@ def actual_state(
         speed_limit_mps=_speed_limit_mps(state, rules, now_ns),
         counters=counters,
         problems=problems,
+        reset_obstacle=reset_obstacle(state, now_ns) if state.latch else "",
     )
     if command:
         message.newest_sequence, message.command_ns = command.sequence, state.command_ns
@@ -173,4 +191,5 @@ def _episode_message(episode: Episode) -> pb.Episode:
         distance_m=episode.distance_m,
         turned_rad=episode.turned_rad,
         ended_by=episode.ended_by,
+        recorded=episode.recorded,
     )

@@ -11,6 +11,7 @@ import time
 from dataclasses import replace
 from typing import Final, Protocol
 
+from common.suspend import SuspendWatch
 from drive import wire
 from drive.endpoint import Endpoint, Peer, Received
 from drive.episode import Episode, followed
@@ -72,6 +73,7 @@ class Worker:
         heartbeats: each carries an ActualState; the guard reads them.
         rules: of the machine.
         state: at the start.
+        episode: of an earlier process, which no gateway has recorded.
         worker_kills: how many before this one the guard has ended.
     """
 
@@ -83,6 +85,7 @@ class Worker:
         rules: Rules,
         state: State,
         *,
+        episode: Episode | None = None,
         worker_kills: int = 0,
     ) -> None:
         self._base = base
@@ -94,7 +97,8 @@ class Worker:
         self._picture = pb.Picture()
         self._picture_ns = 0
         self._counters = pb.Counters(worker_kills=worker_kills)
-        self._episode: Episode | None = None
+        self._episode = episode
+        self._suspends = SuspendWatch()
         self._cycled_ns = 0
         self._published_ns = 0
         self._reported_ns = 0
@@ -122,7 +126,12 @@ class Worker:
         """Waits for a message, the next cycle, or the end of the command's validity, and acts on it."""
         expires_ns, expected_ns = self._state.expires_ns, self._due_ns
         until_ns = expected_ns if expires_ns is None else min(expected_ns, expires_ns)
-        for received in self._endpoint.wait((until_ns - time.monotonic_ns()) / 1e9):
+        arrived = self._endpoint.wait((until_ns - time.monotonic_ns()) / 1e9)
+        if self._suspends.resumed():
+            # First: what has arrived may be as old as the suspend is long.
+            _log.warning("the computer was suspended: a driver counts as lost")
+            self._lose_driver(time.monotonic_ns())
+        for received in arrived:
             self._take(received, time.monotonic_ns())
         now_ns, due_ns = time.monotonic_ns(), self._due_ns
         if now_ns >= due_ns:
@@ -139,6 +148,11 @@ class Worker:
         return self._state
 
     @property
+    def unrecorded(self) -> Episode | None:
+        """A time of motion that has ended, and that no gateway has recorded."""
+        return self._episode if self._episode and self._episode.unrecorded else None
+
+    @property
     def _due_ns(self) -> int:
         """When the next cycle is due: at once after the end of a rest."""
         return self._cycled_ns + (_REST_CYCLE_NS if self._state.phase in RESTING else _CYCLE_NS)
@@ -150,6 +164,8 @@ class Worker:
             self._report(now_ns)
         elif received.WhichOneof("message") == "picture":
             self._picture, self._picture_ns = received.picture, now_ns
+        elif received.WhichOneof("message") == "recorded":
+            self._take_record(received.recorded)
         elif event := wire.event_of(received):
             self._feed(event, now_ns)
             if received.WhichOneof("message") == "desired":
@@ -157,9 +173,17 @@ class Worker:
             if received.WhichOneof("message") in _CONFIRMED:
                 self._report(now_ns)
 
+    def _take_record(self, recorded: pb.Recorded) -> None:
+        episode = self._episode
+        if episode and (episode.episode_id, episode.started_ns) == (recorded.episode_id, recorded.started_ns):
+            self._episode = replace(episode, recorded=True)
+
     def _gateway_left(self, now_ns: int) -> None:
         _log.warning("the gateway has gone")
         self._picture = pb.Picture()
+        self._lose_driver(now_ns)
+
+    def _lose_driver(self, now_ns: int) -> None:
         if lease := self._state.lease:
             self._feed(EndLease(lease.session_id, LeaseEnd.LOST), now_ns)
 
@@ -275,7 +299,17 @@ class Worker:
             return
         for _ in range(_FAREWELL_ZEROS):
             self._base.publish(ZERO, time.monotonic_ns())
+        self._end_episode(time.monotonic_ns())
         self._base.wait_until_acknowledged()
+
+    def _end_episode(self, now_ns: int) -> None:
+        """Reports the end of the motion that this process has ended."""
+        if self._episode is None or self._episode.ended_ns:
+            return
+        self._episode = self._episode.ended(now_ns, "robot-drive was ended")
+        if not self.orphaned:
+            self._beat(now_ns)
+        self._report(now_ns)
 
 
 def _differs(before: State, after: State) -> bool:

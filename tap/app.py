@@ -11,7 +11,7 @@ from typing import Any, Final, NoReturn
 
 from common import bind, heartbeat
 from common.metrics_endpoint import serving_metrics
-from common.ros_node import ros_node
+from common.ros_node import OwnNode, ros_node
 from common.tasks import cancel
 from tap.camera import Graph
 from tap.config import MetricsSettings, TapSettings
@@ -21,7 +21,6 @@ from tap.totals import Totals
 
 _log = logging.getLogger(__name__)
 
-NODE: Final = "robot_camera_tap"
 MAX_CONNECTIONS: Final = 32
 """A preview has at most two cameras open, and asks for those of the others that are there."""
 HUNG_AFTER_S: Final = 10.0
@@ -37,7 +36,7 @@ async def serve(settings: TapSettings, stop: asyncio.Event) -> None:
         UserError: the socket or ROS 2 can't be used.
     """
     totals = Totals()
-    with ros_node(NODE) as node:
+    with ros_node(OwnNode.TAP) as node:
         connections = Connections(Graph(node), totals, 1 / settings.max_fps)
         async with connections.accepting(settings), _metrics(settings.metrics, totals):
             checking = asyncio.create_task(connections.check(), name="check threads")

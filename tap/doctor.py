@@ -68,11 +68,11 @@ def program_findings(state: dict[str, object]) -> Iterator[Finding]:
 
 def _graph() -> Iterator[Finding]:
     # Late: without ROS 2 the rest is still examined.
-    from common.ros_node import middleware_name, readable_names, ros_node  # noqa: PLC0415
+    from common.ros_node import OwnNode, middleware_name, readable_names, ros_node  # noqa: PLC0415
     from tap.camera import Camera, Graph  # noqa: PLC0415
 
     yield from transport_finding(middleware_name())
-    with ros_node("robot_tap_doctor") as node, readable_names():
+    with ros_node(OwnNode.TAP_DOCTOR) as node, readable_names():
         found = _discovered(
             lambda: sorted(
                 name

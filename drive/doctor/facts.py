@@ -51,8 +51,10 @@ class PulseFacts:
         commanded_mps: of the pulse.
         fastest_mps: by odometry; None without odometry.
         stopped_after_s: from the last velocity on, without a zero; None if it had not stopped in time.
+        interrupted: that the pulse was left out or ended early, and why, for people; empty if it was not.
     """
 
     commanded_mps: float
     fastest_mps: float | None
     stopped_after_s: float | None
+    interrupted: str = ""

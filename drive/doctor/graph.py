@@ -1,4 +1,4 @@
-"""Looks at the graph for the doctor, and moves the robot a little where that was asked for."""
+"""Looks at the graph for the doctor."""
 
 import time
 from collections.abc import Callable
@@ -6,10 +6,11 @@ from typing import Any, Final
 
 from rclpy.executors import SingleThreadedExecutor
 
-from drive.base import OBSERVERS, VelocityPublisher, is_still, newest, subscribe, velocity_of
+from common.ros_node import OWN_NODES
 from drive.config import DriveSettings
-from drive.doctor.facts import GraphFacts, PulseFacts, TopicFacts
-from drive.values import ZERO, Velocity
+from drive.doctor.facts import GraphFacts, TopicFacts
+from drive.subscriptions import newest, subscribe, velocity_of
+from drive.values import ZERO
 
 DISCOVERY_S: Final = 3.0
 _LISTEN_S: Final = 1.0
@@ -17,9 +18,6 @@ _POLL_S: Final = 0.02
 _PARAMETER_S: Final = 1.0
 _TIMEOUTS: Final = ("reference_timeout", "cmd_vel_timeout")
 """Of the mecanum and the differential drive controllers of ros2_controllers, in seconds; 0 is none."""
-PULSE_MPS: Final = 0.05
-_PULSE_S: Final = 0.5
-_SILENCE_S: Final = 3.0
 _DOUBLE: Final = 3
 """rcl_interfaces/msg/ParameterType.PARAMETER_DOUBLE."""
 
@@ -52,41 +50,6 @@ def look(node: Any, settings: DriveSettings) -> GraphFacts:
     )
 
 
-def pulse(node: Any, settings: DriveSettings) -> PulseFacts:
-    """Moves the robot forward for half a second, then says nothing, and watches when it stops.
-
-    It ends with zeros, whatever happens: at the latest the silence ends with them.
-    """
-    odometry = subscribe(node, "nav_msgs/msg/Odometry", settings.odometry) if settings.odometry else None
-    velocities = VelocityPublisher(node, settings.outputs, lock_topic=None)
-    fastest: float | None = None
-    still = False
-
-    def watch() -> bool:
-        nonlocal fastest, still
-        if message := newest(odometry):
-            measured = velocity_of(message.twist)
-            fastest = max(fastest or 0.0, measured.linear_mps)
-            still = is_still(measured)
-        return still
-
-    def move() -> bool:
-        velocities.publish(Velocity(vx_mps=PULSE_MPS))
-        watch()
-        return False
-
-    _poll(lambda: velocities.matched() > 0, DISCOVERY_S)
-    try:
-        _poll(move, _PULSE_S)
-        last_s = time.monotonic()
-        stopped = _poll(watch, _SILENCE_S)
-        stopped_after_s = time.monotonic() - last_s if stopped else None
-    finally:
-        velocities.publish(ZERO)
-        velocities.wait_until_acknowledged()
-    return PulseFacts(PULSE_MPS, fastest, stopped_after_s)
-
-
 def _poll(done: Callable[[], bool], for_s: float) -> bool:
     """Calls `done` until it returns true or time is up; returns which. Nothing here is spun."""
     end_s = time.monotonic() + for_s
@@ -110,7 +73,7 @@ def _topic(node: Any, name: str, type_name: str) -> TopicFacts:
 
 
 def _foreign(found: list[Any]) -> list[Any]:
-    return [each for each in found if each.node_name not in OBSERVERS]
+    return [each for each in found if each.node_name not in OWN_NODES]
 
 
 def _configured(settings: DriveSettings) -> dict[str, float]:

@@ -141,6 +141,13 @@ def _base(facts: GraphFacts) -> Iterator[Finding]:
 
 def _stop_topic(topic: TopicFacts) -> Finding:
     check = f"stop{topic.name}"
+    if len(topic.publishers) > 1:
+        return wrong(
+            check,
+            f"{', '.join(topic.publishers)} all publish the robot's own stop on {topic.name}",
+            "Which of them releases can't be told: it counts as pressed, no one can drive (ROBOT_STOP)",
+            "Give each a topic of its own, and list them all in stop_topics",
+        )
     if topic.publishers:
         return good(check, f"{topic.name} comes from {', '.join(topic.publishers)}")
     return wrong(
@@ -189,6 +196,14 @@ def timeout_finding(check: str, timeout_s: float | None, source: str) -> Finding
 
 def pulse_findings(facts: PulseFacts) -> Iterator[Finding]:
     """Yields what a test pulse has shown."""
+    if facts.interrupted:
+        yield note(
+            "pulse",
+            f"the pulse {facts.interrupted}",
+            "The robot is moved only where no one and nothing forbids it",
+            "Try again when driving is enabled, no driver has the robot, and no stop is in force",
+        )
+        return
     if facts.fastest_mps is None:
         yield wrong(
             "pulse",

@@ -8,7 +8,14 @@ from typing import Any, Final
 
 from common.errors import UserError
 from common.findings import Finding, Verdict, good, note, wrong
-from common.ros_node import TypeMissingError, message_class, middleware_name, ros_node, share_directory
+from common.ros_node import (
+    OwnNode,
+    TypeMissingError,
+    message_class,
+    middleware_name,
+    ros_node,
+    share_directory,
+)
 from common.ros_transport_findings import transport_finding
 from gateway.config import SourceSettings
 from gateway.ros.field_types import FieldMissingError, check_field
@@ -42,7 +49,7 @@ def ros_findings(sources: Sequence[SourceSettings]) -> Iterator[Finding]:
         if finding.verdict is not Verdict.WRONG:
             readable.append(source)
     try:
-        with ros_node("robot_gateway_doctor") as node:
+        with ros_node(OwnNode.GATEWAY_DOCTOR) as node:
             yield good("ros", f"ROS 2 starts, with {middleware_name()}")
             found = _discover(node, readable)
     except UserError as error:

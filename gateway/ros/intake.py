@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from common.ros_node import TypeMissingError, ros_node
+from common.ros_node import OwnNode, TypeMissingError, ros_node
 from common.sampler import SAMPLING_HZ, Sampler
 from gateway.config import SourceSettings
 from gateway.ros.field_types import FieldMissingError
@@ -41,7 +41,7 @@ def intake(
     """
     for source in settings:
         reader_for(source)  # reports a mistake in the configuration before anything starts
-    with ros_node("robot_gateway") as node:
+    with ros_node(OwnNode.GATEWAY) as node:
         sources = dict(_open(node, settings, board))
         monitor = PublisherMonitor(node, [source for source in settings if source.name in sources], board)
         with Sampler((*sources.values(), monitor), board, rate_hz) as sampler:

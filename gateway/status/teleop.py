@@ -94,7 +94,11 @@ class DriveCounters:
 
 @dataclass(frozen=True, slots=True)
 class DriveEpisode:
-    """A time of motion, from a hold to its end, as commanded; `ended_ns` is 0 while it lasts."""
+    """A time of motion, from a hold to its end, as commanded; `ended_ns` is 0 while it lasts.
+
+    Attributes:
+        recorded: whether it is in the audit log; None of an older drive program, which does not know.
+    """
 
     episode_id: int
     holder: str
@@ -103,6 +107,7 @@ class DriveEpisode:
     distance_m: float
     turned_rad: float
     ended_by: str
+    recorded: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +119,7 @@ class DriveActual:
         velocity: published.
         problems: of the base, for people.
         base_timeout_ms: silence after which the base stops by itself; None if it is not known.
+        reset_obstacle: what keeps the stop from being reset, for people; empty when nothing does.
     """
 
     instance_id: str
@@ -130,6 +136,7 @@ class DriveActual:
     episode: DriveEpisode | None = None
     problems: tuple[str, ...] = ()
     base_timeout_ms: int | None = None
+    reset_obstacle: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,18 +31,21 @@ class Episodes:
         self._sink = sink
         self._began_ns = time.monotonic_ns()
         self._drivers: deque[tuple[Driver, str]] = deque(maxlen=_REMEMBERED)
-        self._recorded: tuple[str, int] | None = None
+        self._recorded: tuple[int, int] | None = None
 
     def note(self, driver: Driver, input_device: str) -> None:
         """Notes who drives from now on, and with what."""
         self._drivers.append((driver, input_device))
 
-    def record(self, instance_id: str, episode: DriveEpisode) -> None:
-        """Records a time of motion that has ended, once."""
-        # What ended earlier was recorded by an earlier gateway.
-        if self._recorded == (instance_id, episode.episode_id) or episode.ended_ns < self._began_ns:
+    def record(self, _instance_id: str, episode: DriveEpisode) -> None:
+        """Records a time of motion that has ended, once.
+
+        Also one that an earlier gateway did not live to record, or an earlier drive program to report.
+        """
+        number = episode.episode_id, episode.started_ns
+        if self._recorded == number or self._was_recorded(episode):
             return
-        self._recorded = instance_id, episode.episode_id
+        self._recorded = number
         drivers = (each for each in reversed(self._drivers) if each[0].name == episode.holder)
         driver, device = next(drivers, (Driver("", episode.holder, ""), ""))
         duration_s = (episode.ended_ns - episode.started_ns) / _NS_PER_S
@@ -60,3 +63,7 @@ class Episodes:
                 motion=motion,
             )
         )
+
+    def _was_recorded(self, episode: DriveEpisode) -> bool:
+        """Whether an earlier gateway has recorded it, as far as an older drive program lets one know."""
+        return episode.ended_ns < self._began_ns if episode.recorded is None else episode.recorded

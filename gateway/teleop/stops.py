@@ -139,7 +139,7 @@ class Stops:
         """Resets a stop; returns what happened, for people.
 
         Raises:
-            PreconditionError: it is not the present one, or the driver holds.
+            PreconditionError: it is not the present one, or the robot might move by its reset.
             DriveUnreachableError: the drive program does not answer.
         """
         stop, now_ns = self._link.view.stop, time.monotonic_ns()
@@ -152,10 +152,12 @@ class Stops:
         sent = self._commands.reset(stop_id)
         if not sent or not await self._confirmed(now_ns, lambda _: True):
             raise DriveUnreachableError(f"the robot's drive program does not answer: {HOW_TO_REACH}")
-        newer = self._link.view.stop
+        view = self._link.view
+        newer = view.stop
         if newer and newer.stop_id == stop_id:
+            obstacle = view.actual.reset_obstacle if view.actual else ""
             raise PreconditionError(
-                f"stop {stop_id} is not reset: the driver holds. Release first", Reason.STOP_NOT_RESET
+                f"stop {stop_id} is not reset: {obstacle or 'try again'}", Reason.STOP_NOT_RESET
             )
         if newer:
             return f"stop {stop_id} is reset; the robot was stopped again by {newer.by}"

@@ -9,6 +9,8 @@ the drive program is gone, or its connection
     to release and to hold again.
 driving is disabled
     The session ends, its lanes with TELEOP_DISABLED.
+the computer was suspended
+    The session ends as lost: what the driver sent may be as old as the suspend is long.
 the gateway is gone
     The drive program sees the end of the connection, or the end of the last command's validity.
 """
@@ -22,6 +24,7 @@ from typing import Final, NoReturn
 
 from common.errors import ConflictError, DriveUnreachableError, PreconditionError, TooMuchError
 from common.reasons import Reason
+from common.suspend import SuspendWatch
 from gateway.links.drive.commands import DriveCommands
 from gateway.links.drive.state import DriveCommand, DriveLink, DriveSpec
 from gateway.status.preview import PreviewView
@@ -94,6 +97,7 @@ class Teleop:
         """The connection and the session that the lease was granted last."""
         self._command: Received[Velocity] | None = None
         self.last_error = ""
+        self._suspends = SuspendWatch()
         self._access_ended = False
         """Whether the newest lease ended because its driver has lost access."""
 
@@ -224,6 +228,10 @@ class Teleop:
         while True:
             await asyncio.sleep(_CHECK_EVERY_S)
             checks += 1
+            if self._suspends.resumed() and (driving := self._driving):
+                # For the drive program, which has noticed it itself, the driver is lost, too.
+                self._lease.end(driving.session, LeaseEnd.LOST)
+                self._end(driving.session, LeaseEnd.LOST)
             if silent := self._lease.silent(time.monotonic()):
                 self._end(silent, silent.ended or LeaseEnd.LOST)
             if checks % _PICTURE_EVERY == 0:

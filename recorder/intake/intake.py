@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from common.receive_time import Instant, present_instant
-from common.ros_node import TypeMissingError, message_class, ros_node
+from common.ros_node import OwnNode, TypeMissingError, message_class, ros_node
 from common.sampler import SAMPLING_HZ, Sampler
 from recorder.intake.qos import is_latched, offered_qos
 from recorder.intake.schemas import ENCODING, Schemas
@@ -57,7 +57,7 @@ def intake(presets: Mapping[str, Selects], put: Put, *, rate_hz: float = SAMPLIN
         UserError: rclpy is missing or can't start.
         TimeoutError: the thread hangs in the middleware at the end.
     """
-    with ros_node("robot_recorder") as node:
+    with ros_node(OwnNode.RECORDER) as node:
         taking = Intake(node, presets, put)
         with Sampler([taking], taking, rate_hz):
             yield taking

@@ -244,6 +244,8 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
                 "common/ros_node.py",
                 "gateway/ros/",
                 "drive/base.py",
+                "drive/stop_input.py",
+                "drive/subscriptions.py",
                 "drive/doctor",
                 "recorder/intake/",
                 "simrobot/",
@@ -355,3 +357,17 @@ def test_the_fence_sees_what_it_should() -> None:
     """A fence that reads no imports would let everybody through."""
     assert offenders("common/gst.py", ("gi",))
     assert len({found.importer for found in imports()}) > 20
+
+
+def test_our_programs_take_the_names_of_their_nodes_from_one_list() -> None:
+    """By it the drive program tells an observer from a base."""
+    calls = {
+        ast.unparse(node.args[0])
+        for program in PROGRAMS
+        if program != "simrobot"
+        for path in (ROOT / program).rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == "ros_node"
+    }
+    assert calls
+    assert all(name.startswith("OwnNode.") for name in calls)

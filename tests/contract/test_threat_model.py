@@ -19,14 +19,25 @@ PROMISES = [
 
 
 def exists(test: str) -> bool:
-    """Whether `file::test` names a test function."""
+    """Whether `file::test` names a test function, or a state machine of Hypothesis."""
     file, _, name = test.partition("::")
     path = ROOT / file
-    if not path.is_file() or not name.startswith("test_"):
+    if not path.is_file() or not name.startswith(("test_", "Test")):
         return False
-    functions = (ast.FunctionDef, ast.AsyncFunctionDef)
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    return any(isinstance(each, functions) and each.name == name for each in tree.body)
+    return any(name in (*_function(each), *_state_machine(each)) for each in tree.body)
+
+
+def _function(statement: ast.stmt) -> tuple[str, ...]:
+    return (statement.name,) if isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef) else ()
+
+
+def _state_machine(statement: ast.stmt) -> tuple[str, ...]:
+    match statement:
+        case ast.Assign(targets=[ast.Name(id=name)], value=ast.Attribute(attr="TestCase")):
+            return (name,)
+        case _:
+            return ()
 
 
 def test_every_row_of_the_table_is_read() -> None:

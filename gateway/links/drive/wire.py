@@ -164,8 +164,15 @@ class DriveClient:
             case "actual" if self._welcome:
                 self._newest = report = report_from(self._welcome, message.actual)
                 if report.episode and report.episode.ended_ns:
-                    self._episode_ended(report.instance_id, report.episode)
+                    self._take_ended(report.instance_id, report.episode)
         self._changed.set()
+
+    def _take_ended(self, instance_id: str, episode: DriveEpisode) -> None:
+        """Hands a time of motion over, and acknowledges it where the drive program keeps it until then."""
+        self._episode_ended(instance_id, episode)
+        if episode.recorded is False:
+            recorded = pb.Recorded(episode_id=episode.episode_id, started_ns=episode.started_ns)
+            self.send(pb.ToDrive(recorded=recorded))
 
     def _lose(self, error: LinkLostError) -> None:
         if self._lost is None:
@@ -216,5 +223,6 @@ def report_from(welcome: pb.Welcome, message: pb.ActualState) -> DriveReport:
         counters=same_fields(DriveCounters, message.counters),
         episode=same_fields(DriveEpisode, message.episode) if message.HasField("episode") else None,
         problems=tuple(message.problems),
+        reset_obstacle=message.reset_obstacle,
         base_timeout_ms=welcome.base_timeout_ms if welcome.HasField("base_timeout_ms") else None,
     )

@@ -12,6 +12,7 @@ from typing import Any
 import psutil
 import pytest
 
+from common.ros_node import OwnNode, message_class, ros_node
 from omniseer.drive.v1 import drive_pb2 as pb
 from tests.support.drive_peer import Instants
 from tests.support.driving import Driving, driving
@@ -110,6 +111,19 @@ def test_without_a_base_nothing_is_driven(tmp_path: Path, ros_domain: int) -> No
         assert "nothing takes the velocities on /cmd_vel_keyboard" in state.problems
 
 
+def test_a_recorder_of_our_own_is_no_base(tmp_path: Path, ros_domain: int) -> None:  # noqa: ARG001
+    stamped = message_class("geometry_msgs/msg/TwistStamped")
+    with driving(tmp_path) as robot, ros_node(OwnNode.RECORDER) as recorder:
+        recorder.create_subscription(stamped, "/cmd_vel_keyboard", print, 10)
+        robot.drive()
+        robot.robot.process.terminate()
+        robot.robot.process.wait(10)
+        later_ns = time.monotonic_ns() + 1_500_000_000
+        wait_until(lambda: robot.state().monotonic_ns > later_ns, "several looks at the graph")
+        assert pb.INHIBIT_BASE_ABSENT in robot.state().inhibits
+        assert list(robot.state().problems) == ["nothing takes the velocities on /cmd_vel_keyboard"]
+
+
 def test_autonomy_has_the_robot_before_and_after(robot: Driving) -> None:
     """Zeros mask a source of lower priority while a driver has the lease, and not afterwards."""
     robot.settled()
@@ -127,6 +141,38 @@ def test_autonomy_has_the_robot_before_and_after(robot: Driving) -> None:
         robot.settled()
         assert robot.witness.zero_after_ms(began_ns) < 1000
         robot.settled()
+    finally:
+        robot.robot.change(commander="nobody", speed_mps=0.0)
+
+
+def test_a_reset_does_not_leave_the_robot_to_autonomy_that_goes_on(robot: Driving) -> None:
+    peer = robot.ready()
+    robot.robot.change(commander="autonomy", speed_mps=0.2, turn_rad_s=0)
+    try:
+        wait_until(robot.witness.moves, "autonomy drives")
+        peer.send(stop="ben")
+        robot.phase_is("STOPPED")
+        robot.settled()
+        state = robot.state()
+        assert "motion on /cmd_vel_autonomy" in state.reset_obstacle
+        peer.send(reset=state.stop.stop_id)
+        began_ns = time.monotonic_ns()
+        wait_until(lambda: robot.state().monotonic_ns > began_ns + 1_000_000_000, "a second")
+        assert robot.state().phase == pb.PHASE_STOPPED
+        assert not robot.witness.motion_since(began_ns)
+        peer.send(lease="anna", held=False)
+        wait_until(lambda: not robot.state().reset_obstacle, "a driver keeps it away")
+        peer.send(reset=state.stop.stop_id)
+        robot.phase_is("ARMED")
+        assert not robot.witness.motion_since(began_ns)
+        peer.send(stop="ben")
+        robot.phase_is("STOPPED")
+        peer.send(end="CLOSED")
+        robot.robot.change(commander="nobody", speed_mps=0.0)
+        wait_until(lambda: not robot.state().reset_obstacle, "autonomy is silent")
+        peer.send(reset=robot.state().stop.stop_id)
+        robot.phase_is("AVAILABLE")
+        assert not robot.witness.motion_since(began_ns)
     finally:
         robot.robot.change(commander="nobody", speed_mps=0.0)
 
@@ -176,6 +222,35 @@ def test_whatever_ends_it_the_last_message_is_zero(robot: Driving, ending: str) 
     robot.settled()
     assert robot.witness.seen
     assert not robot.witness.moves()
+
+
+LOSSES = {
+    "gateway killed": (_signal("gateway", signal.SIGKILL), "stopped by anna: the driver was lost"),
+    "worker killed": (_signal("worker", signal.SIGKILL), "robot-drive lost its worker"),
+    "worker frozen": (_signal("worker", signal.SIGSTOP), "robot-drive lost its worker"),
+    "ended": (_signal("guard", signal.SIGTERM), "robot-drive was ended"),
+    "guard killed": (_signal("guard", signal.SIGKILL), "robot-drive was ended"),
+}
+
+
+@pytest.mark.parametrize("loss", LOSSES)
+def test_a_motion_that_no_gateway_has_recorded_outlives_the_program(robot: Driving, loss: str) -> None:
+    lose, why = LOSSES[loss]
+    robot.drive()
+    started_ns = robot.state().episode.started_ns
+    lose(robot)
+    robot.settled()
+    assert robot.guard
+    if robot.guard.poll() is not None:
+        wait_until(lambda: robot.observer.state() is None, "the drive program has gone")
+        robot.start()
+    episode = wait_until(
+        lambda: episode if (episode := robot.state().episode).ended_ns else None, "the end of the motion", 30
+    )
+    assert (episode.holder, episode.started_ns, episode.recorded) == ("anna", started_ns, False)
+    assert episode.ended_by.startswith(why)
+    assert 0 < episode.distance_m < 1
+    assert 0 < (episode.ended_ns - episode.started_ns) / 1e9 < 60
 
 
 def test_a_terminal_that_reads_nothing_keeps_no_zero_back(tmp_path: Path, ros_domain: int) -> None:  # noqa: ARG001

@@ -1,5 +1,9 @@
 """The robot's own stop: a topic that says nothing counts as pressed."""
 
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +12,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from common.ros_node import message_class, ros_node
 from omniseer.drive.v1 import drive_pb2 as pb
-from tests.support.driving import driving
+from tests.support.driving import Driving, driving
+from tests.support.helper import helper
 from tests.support.waiting import wait_until
 
 pytestmark = [pytest.mark.ros, pytest.mark.timed]
@@ -44,3 +49,62 @@ def test_it_is_pressed_until_a_live_publisher_says_otherwise(
             robot.phase_is("ARMED")
         robot.phase_is("INHIBITED")
         wait_until(lambda: list(robot.state().inhibits) == [pb.INHIBIT_ROBOT_STOP], "the button has gone")
+
+
+@contextmanager
+def leased(robot: Driving) -> Iterator[None]:
+    """A driver who does not hold, so that the reasons to inhibit are reported."""
+    robot.ready().send(lease="anna", held=False)
+    robot.phase_is("INHIBITED", "ARMED")
+    yield
+
+
+def test_what_one_publisher_has_pressed_no_other_releases(tmp_path: Path, ros_domain: int) -> None:  # noqa: ARG001
+    boolean = message_class("std_msgs/msg/Bool")
+    with driving(tmp_path, stop_topics=["/stop_button"]) as robot, ros_node("button") as button:
+        pressing = button.create_publisher(boolean, "/stop_button", LATCHED)
+        pressing.publish(boolean(data=False))
+        with leased(robot), ros_node("other") as other:
+            robot.phase_is("ARMED")
+            releasing = other.create_publisher(boolean, "/stop_button", LATCHED)
+            wait_until(lambda: "2 publishers" in " ".join(robot.state().problems), "both are seen")
+            pressing.publish(boolean(data=True))
+            releasing.publish(boolean(data=False))
+            later_ns = time.monotonic_ns() + 500_000_000
+            wait_until(lambda: robot.state().monotonic_ns > later_ns, "many cycles")
+            assert pb.INHIBIT_ROBOT_STOP in robot.state().inhibits
+            pressing.publish(boolean(data=False))
+            button.destroy_publisher(pressing)
+            robot.phase_is("ARMED")
+            assert not robot.state().problems
+
+
+def test_a_press_that_is_released_at_once_counts(tmp_path: Path, ros_domain: int) -> None:  # noqa: ARG001
+    boolean = message_class("std_msgs/msg/Bool")
+    with driving(tmp_path, stop_topics=["/stop_button"]) as robot, ros_node("button") as button:
+        publisher = button.create_publisher(boolean, "/stop_button", QoSProfile(depth=10))
+        wait_until(lambda: publisher.get_subscription_count() >= 2, "its subscribers")
+        publisher.publish(boolean(data=False))
+        robot.drive()
+        for pressed in (True, False):
+            publisher.publish(boolean(data=pressed))
+        robot.phase_is("INHIBITED")
+        robot.settled()
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_publisher_that_is_silent_counts_as_pressed_where_that_is_configured(
+    tmp_path: Path,
+    ros_domain: int,  # noqa: ARG001  # for its effect
+    number: signal.Signals,
+) -> None:
+    with (
+        driving(tmp_path, stop_topics=["/stop_button"], stop_timeout_ms=500) as robot,
+        helper("tests.support.stop_button", "/stop_button") as button,
+    ):
+        robot.drive()
+        button.send_signal(number)
+        began_ns = time.monotonic_ns()
+        assert pb.INHIBIT_ROBOT_STOP in robot.phase_is("INHIBITED").inhibits
+        robot.settled()
+        assert robot.witness.zero_after_ms(began_ns) < 1000

@@ -69,6 +69,7 @@ def test_a_good_robot_has_nothing_to_mend() -> None:
         ),
         (replace(GOOD, foreign_motion=20), "base.driven", Verdict.NOTE, "20"),
         (replace(GOOD, stops=[TopicFacts("/stop", "x")]), "stop/stop", Verdict.WRONG, "nothing publishes"),
+        (replace(GOOD, stops=[TopicFacts("/stop", "x", ("a", "b"))]), "stop/stop", Verdict.WRONG, "a, b all"),
         (replace(GOOD, odometry=replace(ODOMETRY, publishers=())), "odometry", Verdict.NOTE, "/odom"),
         (replace(GOOD, timeouts={}), "base.timeout", Verdict.NOTE, "no node"),
         (replace(GOOD, timeouts={"a: x": 0.5, "b: y": 0.0}), "base.timeout", Verdict.WRONG, "b: y"),

@@ -33,11 +33,13 @@ if then == "crash" and os.path.exists(started):
 beats = socket.socket(fileno=int(os.environ["DRIVE_HEARTBEATS"]))
 if then == "ignore":
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
+episode = pb.Episode(episode_id=3, holder="anna", started_ns=1, distance_m=0.5)
 phase = pb.PHASE_AVAILABLE if then == "rest" else pb.PHASE_DRIVING
 for number in range(1_000_000):
     if number == 20 or then == "garbage":
         begin()
-    beats.send(b"\\xff\\xff" if then == "garbage" else pb.ActualState(phase=phase).SerializeToString())
+    state = pb.ActualState(phase=phase, episode=episode)
+    beats.send(b"\\xff\\xff" if then == "garbage" else state.SerializeToString())
     time.sleep(0.01)
 """
 
@@ -134,6 +136,10 @@ def test_zeros_go_on_while_the_next_workers_fail(tmp_path: Path) -> None:
         wait_until(lambda: len(running.pids()) >= 4, "three attempts")
         zeros = running.zeros.since(began_s)
         assert zeros[-1] > 0.6, "beyond the first attempt"
+        episode = read_stops(running.stop_file).episode
+        assert episode
+        assert (episode.holder, episode.distance_m) == ("anna", 0.5)
+        assert episode.ended_by == "robot-drive lost its worker"
         assert read_stops(running.stop_file).latch == Latch(
             1, "robot-drive", "its worker was lost while a driver had the robot"
         )

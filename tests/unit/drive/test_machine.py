@@ -19,6 +19,7 @@ from drive.machine import (
     State,
     Stop,
     Tick,
+    reset_obstacle,
     step,
 )
 from drive.phases import TRANSITIONS, Phase, Trigger
@@ -288,6 +289,27 @@ def test_a_reset_never_moves_and_waits_for_the_release() -> None:
     assert robot.driven(100).output == ZERO
     robot.command(held=False)
     assert robot.command(held=True).phase is Phase.DRIVING
+
+
+def test_a_reset_leaves_the_robot_to_no_source_that_goes_on() -> None:
+    robot = Robot()
+    robot.feed(Stop("ben"))
+    robot.feed(Observe(replace(CLEAR, commanded_on=("/cmd_vel_nav",))))
+    assert "/cmd_vel_nav" in reset_obstacle(robot.state, robot.now_ns)
+    assert robot.feed(Reset(robot.stop_id)).latch
+    for doubt in (replace(CLEAR, outranked=True), replace(CLEAR, sources_known=False)):
+        robot.feed(Observe(doubt))
+        assert robot.feed(Reset(robot.stop_id)).latch
+    robot.feed(Observe(CLEAR))
+    assert not reset_obstacle(robot.state, robot.now_ns)
+    assert robot.feed(Reset(robot.stop_id)).phase is Phase.AVAILABLE
+
+
+def test_a_driver_who_keeps_other_sources_away_resets_the_stop() -> None:
+    robot = in_phase(Phase.STOPPED)
+    robot.feed(Observe(replace(CLEAR, commanded_on=("/cmd_vel_nav",))))
+    robot.command(held=False)
+    assert robot.feed(Reset(robot.stop_id)).phase is Phase.ARMED
 
 
 def test_a_lost_driver_does_not_hide_who_stopped_the_robot() -> None:

@@ -177,9 +177,9 @@ class Driving(RuleBasedStateMachine):
     ) -> None:
         """Does everything that it takes to drive, perhaps until it is as fast as it may be."""
         self.drive(held=False, velocity=ZERO, times=1)
+        self.all_clear()
         self.reset(right=True)
         self.enable(enabled=True)
-        self.all_clear()
         self.grant(session="s1", supervision=supervision, streaming=streaming)
         self.drive(held=False, velocity=ZERO, times=1)
         self.drive(held=True, velocity=velocity, times=times, flaw=flaw)
@@ -213,6 +213,15 @@ class Driving(RuleBasedStateMachine):
         assert self.state.phase is Phase.STOPPED
         assert self.state.output == ZERO
 
+    @rule(bad=st.sampled_from("ocu"))
+    def reset_beside_another_source(self, bad: str) -> None:
+        """Stops, and resets while another source moves the robot, or would."""
+        self.drive(held=False, velocity=ZERO, times=1)
+        self.stop(by="anna")
+        self.observe(running=True, newest_ms=0, base=True, bad=bad)
+        self.reset(right=True)
+        assert (self.state.latch is None) == (bad != "o" and self.lease is not None)
+
     @rule(right=st.booleans())
     def reset(self, right: bool) -> None:
         latch = self.state.latch
@@ -224,7 +233,10 @@ class Driving(RuleBasedStateMachine):
             self.newest, self.released = None, False
 
     @rule(
-        running=st.booleans(), newest_ms=st.integers(-900, 0), base=st.booleans(), bad=st.sampled_from("sofn")
+        running=st.booleans(),
+        newest_ms=st.integers(-900, 0),
+        base=st.booleans(),
+        bad=st.sampled_from("sofncu"),
     )
     def observe(self, running: bool, newest_ms: int, base: bool, bad: str) -> None:
         good = Surroundings(preview_running=True, newest_capture_ns=10**18, base_present=True, still=True)
@@ -233,6 +245,8 @@ class Driving(RuleBasedStateMachine):
             "o": {"outranked": True},
             "f": {"preview_running": running, "newest_capture_ns": self.now_ns + newest_ms * MS},
             "n": {"base_present": base, "still": None},
+            "c": {"commanded_on": ("/cmd_vel_autonomy",)},
+            "u": {"sources_known": False},
         }
         self.feed(Observe(replace(good, **kinds[bad])))
 
@@ -267,6 +281,7 @@ class Driving(RuleBasedStateMachine):
         if lease.supervision is Supervision.PICTURE:
             assert around.preview_running
             assert command.picture_ns <= self.arrived_ns + 20 * MS
+            assert command.picture_ns <= around.newest_capture_ns + 20 * MS
             assert self.now_ns - command.picture_ns <= 600 * MS
 
     def slowing_down_only_follows_a_release(self) -> None:
@@ -303,6 +318,8 @@ class Driving(RuleBasedStateMachine):
             age_s = (self.now_ns - self.newest.picture_ns) / 1e9
             assert not by_eye or output.linear_mps <= limits.line_of_sight_mps + 1e-9
             assert by_eye or output.linear_mps * age_s <= limits.picture_travel_m + 1e-9
+            assert not by_eye or abs(output.wz_rad_s) <= limits.line_of_sight_rad_s + 1e-9
+            assert by_eye or abs(output.wz_rad_s) * age_s <= limits.picture_turn_rad + 1e-9
         elapsed_s = (self.state.output_ns - self.before.output_ns) / 1e9
         previous = self.before.output or ZERO
         for name, limit in (
@@ -325,6 +342,10 @@ class Driving(RuleBasedStateMachine):
             assert self.before.latch is not None
             assert self.event.stop_id == self.before.latch.stop_id
             assert not self.before.holding(self.now_ns)
+            around = self.before.surroundings
+            assert not around.outranked
+            quiet = around.sources_known and not around.commanded_on
+            assert self.lease or quiet, "the reset would leave it to another source"
 
     def the_sequence_only_grows(self) -> None:
         before, after = self.before.command, self.state.command

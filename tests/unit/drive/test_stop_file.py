@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from drive import stop_file
+from drive.episode import Episode
 from drive.stop_file import StopFile, Stops, read_stops
 from drive.values import Latch
 
@@ -15,11 +16,18 @@ STOPPED = Stops(7, Latch(7, "ben", "a child in the way"))
 def test_a_stop_and_its_number_outlive_the_program(tmp_path: Path) -> None:
     path = tmp_path / "state" / "stop.json"
     assert read_stops(path) == Stops()
-    for stops in (STOPPED, Stops(7)):
+    moved = Episode(3, "anna", 10, 20, 0.5, 0.1, "released")
+    for stops in (STOPPED, Stops(7), Stops(7, STOPPED.latch, moved)):
         file = StopFile(path)
         file.keep(stops)
         file.close()
         assert read_stops(path) == stops
+
+
+def test_a_file_of_an_earlier_release_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "stop.json"
+    path.write_bytes(b'{"last_id": 7, "latch": {"stop_id": 7, "by": "ben", "reason": "a child in the way"}}')
+    assert read_stops(path) == STOPPED
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import socket
 from collections import deque
+from itertools import chain, repeat
 from types import SimpleNamespace
 from typing import Any
 
@@ -105,6 +106,12 @@ class World:
         """Nothing more happens from then on."""
         self.at(ms, pb.ToDrive(picture=pb.Picture()))
 
+    def timed_beats(self) -> list[tuple[pb.ActualState, int]]:
+        return [(what, ns) for kind, what, ns in self.journal if kind == "beat"]
+
+    def beats(self) -> list[pb.ActualState]:
+        return [beat for beat, _ in self.timed_beats()]
+
     def velocities(self) -> list[tuple[float, Velocity]]:
         return [((ns - START_NS) / MS, what) for kind, what, ns in self.journal if kind == "velocity"]
 
@@ -160,6 +167,20 @@ def test_a_gateway_that_goes_takes_the_lease_with_it(world: World) -> None:
     assert beats[-1].session_id == ""
 
 
+def test_a_suspend_loses_the_driver_before_what_has_arrived_counts(world: World) -> None:
+    world.drives()
+    once = chain([True], repeat(False))
+    world.worker._suspends = SimpleNamespace(  # type: ignore[assignment]
+        resumed=lambda: world.now_ns >= START_NS + 150 * MS and next(once)
+    )
+    world.end(400)
+    world.worker.run()
+    assert world.moving()
+    assert max(world.moving()) < 150
+    assert world.worker.state.latch
+    assert "the driver was lost" in world.worker.state.latch.reason
+
+
 def test_the_last_is_zero_when_the_loop_fails(world: World) -> None:
     world.drives()
     world.at(210, RuntimeError("a defect"))
@@ -168,6 +189,31 @@ def test_the_last_is_zero_when_the_loop_fails(world: World) -> None:
     assert world.moving()
     assert world.velocities()[-1][1] == ZERO
     assert world.journal[-1][0] == "acknowledged"
+
+
+def test_a_motion_that_the_end_of_the_program_ends_is_reported_to_the_guard(world: World) -> None:
+    world.drives()
+    world.end(210)
+    world.worker.run()
+    episode = world.beats()[-1].episode
+    assert (episode.holder, episode.ended_by) == ("anna", "robot-drive was ended")
+    assert 0 < episode.started_ns < episode.ended_ns
+    assert not episode.recorded
+    assert world.worker.unrecorded
+
+
+def test_a_motion_stays_until_a_gateway_has_recorded_it(world: World) -> None:
+    world.drives()
+    world.command(220, held=False)
+    for ms, number in ((300, 2), (400, 1)):
+        started_ns = START_NS + 40 * MS
+        world.at(ms, pb.ToDrive(recorded=pb.Recorded(episode_id=number, started_ns=started_ns)))
+    world.end(600)
+    world.worker.run()
+    between_ns = START_NS + 400 * MS
+    assert not any(beat.episode.recorded for beat, at_ns in world.timed_beats() if at_ns < between_ns)
+    assert world.beats()[-1].episode.recorded
+    assert world.worker.unrecorded is None
 
 
 def test_the_last_is_zero_without_a_guard(world: World) -> None:

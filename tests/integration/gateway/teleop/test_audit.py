@@ -1,13 +1,16 @@
 """What the robot's audit log keeps of driving: each time of motion, each stop, and who was refused."""
 
 import json
+import os
+import signal
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from console.client import AsyncGatewayClient, Credentials, NotAllowed, Refused
+from console.client import AsyncGatewayClient, Credentials, DriveSession, GatewayError, NotAllowed, Refused
 from console.robots.login import parse_login
 from gateway.access.credential import Kind
 from gateway.access.credential_admin import CredentialRequest
@@ -42,6 +45,12 @@ def records(file: Path) -> list[dict[str, Any]]:
     )
 
 
+def motions(directory: Path) -> list[dict[str, Any]]:
+    """The times of motion in a gateway's audit log."""
+    kept = records(directory / "credentials/audit.jsonl")
+    return [each for each in kept if each["action"] == "Drive" and " m, " in each["request"]]
+
+
 async def test_who_drove_who_stopped_and_who_was_refused(
     guarded: tuple[Guarded, Base], tmp_path: Path
 ) -> None:
@@ -74,17 +83,12 @@ async def test_who_drove_who_stopped_and_who_was_refused(
             await in_motion(session, base, SPEED_MPS)
             robot.admin.revoke(anna_id)
 
-            async def ended() -> bool:
-                session.hold(SPEED_MPS)
-                return session.error is not None
+            await eventually(lambda: has_ended(session), bool, "the driver's access has ended")
 
-            await eventually(ended, bool, "the driver's access has ended")
+        async def recorded() -> list[dict[str, Any]]:
+            return motions(tmp_path)
 
-        async def motions() -> list[dict[str, Any]]:
-            kept = records(tmp_path / "credentials/audit.jsonl")
-            return [each for each in kept if each["action"] == "Drive" and " m, " in each["request"]]
-
-        first, second = await eventually(motions, lambda it: len(it) == 2, "both times of motion")
+        first, second = await eventually(recorded, lambda it: len(it) == 2, "both times of motion")
     assert {(each["who"], each["role"]) for each in (first, second)} == {("anna", "operator")}
     assert all(each["request"].endswith("by test") for each in (first, second))
     assert "vic" in first["answer"], "stopped by the viewer"
@@ -96,3 +100,35 @@ async def test_who_drove_who_stopped_and_who_was_refused(
     assert all("a child on the track" in each["request"] for each in stops)
     refused = records(tmp_path / "credentials/audit-refused.jsonl")
     assert {(each["who"], each["action"]) for each in refused} >= {("vic", "ResetStop")}
+
+
+async def test_a_motion_that_a_killed_gateway_left_is_recorded_by_the_next(
+    module_ros_domain: int,  # noqa: ARG001  # for its effect
+    tmp_path: Path,
+) -> None:
+    first, second = tmp_path / "first", tmp_path / "second"
+    for directory in (first, second):
+        directory.mkdir()
+    with listening_base() as base, running_drive(tmp_path) as drive:
+        teleop = {"socket": str(drive.socket), "line_of_sight": True}
+        with guarded_program(first, first, teleop=teleop) as robot:
+            anna, _ = added(robot, "anna", Role.OPERATOR)
+            async with AsyncGatewayClient(robot.target, credentials=anna) as driver:
+                with suppress(GatewayError):
+                    async with driver.drive(BY_EYE) as session:
+                        await in_motion(session, base, SPEED_MPS)
+                        os.kill(robot.pid, signal.SIGKILL)
+                        await eventually(lambda: has_ended(session), bool, "the session has ended")
+        assert not motions(first)
+        with guarded_program(second, second, teleop=teleop):
+
+            async def recorded() -> list[dict[str, Any]]:
+                return motions(second)
+
+            (motion,) = await eventually(recorded, bool, "the time of motion")
+    assert motion["answer"].startswith("stopped by anna: the driver was lost")
+
+
+async def has_ended(session: DriveSession) -> bool:
+    session.hold(SPEED_MPS)
+    return session.error is not None

@@ -16,6 +16,7 @@ import grpc
 import pytest
 
 from common.reasons import Reason
+from common.ros_node import message_class, ros_node
 from console.client import (
     AsyncGatewayClient,
     CaughtUp,
@@ -103,6 +104,42 @@ async def test_a_session_that_is_left_by_an_error_stops_the_robot(
         await fails()
     await comes_to_rest(robot)
     assert (await teleop_of(client)).stop is None, "that was a release, not a loss"
+
+
+async def test_a_reset_that_is_refused_names_the_other_source(
+    robot: DrivenRobot, client: AsyncGatewayClient
+) -> None:
+    twist_stamped = message_class("geometry_msgs/msg/TwistStamped")
+
+    async def plan(publisher: Any) -> None:
+        message = twist_stamped()
+        message.twist.linear.x = SPEED_MPS
+        while True:
+            publisher.publish(message)
+            await asyncio.sleep(0.05)
+
+    async def moved_for_a_second() -> bool:
+        return sum(each.moves for each in robot.base.heard[heard:]) >= 20
+
+    async def resets() -> str:
+        teleop = await teleop_of(client)
+        try:
+            await client.reset_stop(teleop.stop.stop_id)
+        except Refused as error:
+            return f"{error.reason}: {error}"
+        return ""
+
+    heard = len(robot.base.heard)
+    with ros_node("planner") as planner:
+        planning = asyncio.create_task(plan(planner.create_publisher(twist_stamped, "/cmd_vel_nav", 1)))
+        await eventually(moved_for_a_second, bool, "the planner moves the robot")
+        await client.stop_robot()
+        refused = await resets()
+        assert refused.startswith(Reason.STOP_NOT_RESET)
+        assert "another source commands motion on /cmd_vel_nav" in refused
+        planning.cancel()
+    await eventually(resets, lambda said: not said, "the other source is silent")
+    await eventually(lambda: teleop_of(client), lambda it: not it.stop, "the status shows it")
 
 
 async def test_hands_that_no_longer_report_are_a_release(

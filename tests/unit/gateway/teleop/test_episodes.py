@@ -57,6 +57,19 @@ def test_one_of_an_earlier_gateway_is_not_recorded_again() -> None:
     assert sink.actions == []
 
 
+def test_one_that_an_earlier_gateway_did_not_live_to_record_is_recorded() -> None:
+    sink = Sink()
+    earlier = ended()
+    episodes = Episodes(sink)
+    lost = replace(earlier, ended_ns=earlier.ended_ns - 1, recorded=False)
+    episodes.record("process", replace(lost, recorded=True))
+    assert sink.actions == []
+    for instance in ("process", "the next one, which reports it again"):
+        episodes.record(instance, lost)
+    (action,) = sink.actions
+    assert (action.address, action.answer) == ("anna", "released")
+
+
 def test_a_driver_without_a_name_is_an_address() -> None:
     sink = Sink()
     episodes = Episodes(sink)

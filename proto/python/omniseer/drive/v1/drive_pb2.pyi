@@ -162,6 +162,7 @@ class ToDrive(_message.Message):
     STOP_FIELD_NUMBER: _builtins.int
     RESET_FIELD_NUMBER: _builtins.int
     PICTURE_FIELD_NUMBER: _builtins.int
+    RECORDED_FIELD_NUMBER: _builtins.int
     @_builtins.property
     def hello(self) -> Global___Hello:
         """Always the first."""
@@ -194,6 +195,10 @@ class ToDrive(_message.Message):
     def picture(self) -> Global___Picture:
         """What the gateway knows of the preview; at least twice a second, or pictures count as missing."""
 
+    @_builtins.property
+    def recorded(self) -> Global___Recorded:
+        """A time of motion is in the audit log. Only to a drive program that reports Episode.recorded."""
+
     def __init__(
         self,
         *,
@@ -205,12 +210,13 @@ class ToDrive(_message.Message):
         stop: Global___Stop | None = ...,
         reset: Global___Reset | None = ...,
         picture: Global___Picture | None = ...,
+        recorded: Global___Recorded | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["command", b"command", "desired", b"desired", "end", b"end", "grant", b"grant", "hello", b"hello", "message", b"message", "picture", b"picture", "reset", b"reset", "stop", b"stop"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["command", b"command", "desired", b"desired", "end", b"end", "grant", b"grant", "hello", b"hello", "message", b"message", "picture", b"picture", "recorded", b"recorded", "reset", b"reset", "stop", b"stop"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["command", b"command", "desired", b"desired", "end", b"end", "grant", b"grant", "hello", b"hello", "message", b"message", "picture", b"picture", "reset", b"reset", "stop", b"stop"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["command", b"command", "desired", b"desired", "end", b"end", "grant", b"grant", "hello", b"hello", "message", b"message", "picture", b"picture", "recorded", b"recorded", "reset", b"reset", "stop", b"stop"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_message: _TypeAlias = _typing.Literal["hello", "desired", "grant", "end", "command", "stop", "reset", "picture"]  # noqa: Y015
+    _WhichOneofReturnType_message: _TypeAlias = _typing.Literal["hello", "desired", "grant", "end", "command", "stop", "reset", "picture", "recorded"]  # noqa: Y015
     _WhichOneofArgType_message: _TypeAlias = _typing.Literal["message", b"message"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_message) -> _WhichOneofReturnType_message | None: ...
 
@@ -575,6 +581,32 @@ class Picture(_message.Message):
 Global___Picture: _TypeAlias = Picture  # noqa: Y015
 
 @_typing.final
+class Recorded(_message.Message):
+    """A time of motion is in the audit log."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    EPISODE_ID_FIELD_NUMBER: _builtins.int
+    STARTED_NS_FIELD_NUMBER: _builtins.int
+    episode_id: _builtins.int
+    """Its number."""
+    started_ns: _builtins.int
+    """Its start: numbers begin anew with each process."""
+    def __init__(
+        self,
+        *,
+        episode_id: _builtins.int = ...,
+        started_ns: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["episode_id", b"episode_id", "started_ns", b"started_ns"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___Recorded: _TypeAlias = Recorded  # noqa: Y015
+
+@_typing.final
 class ActualState(_message.Message):
     """The state of the drive program at one instant."""
 
@@ -595,6 +627,7 @@ class ActualState(_message.Message):
     COUNTERS_FIELD_NUMBER: _builtins.int
     EPISODE_FIELD_NUMBER: _builtins.int
     PROBLEMS_FIELD_NUMBER: _builtins.int
+    RESET_OBSTACLE_FIELD_NUMBER: _builtins.int
     monotonic_ns: _builtins.int
     """The instant."""
     applied_revision: _builtins.int
@@ -615,6 +648,8 @@ class ActualState(_message.Message):
     """Turning rate published, in rad/s."""
     speed_limit_mps: _builtins.float
     """Speed limit by the picture's age, in m/s."""
+    reset_obstacle: _builtins.str
+    """What keeps the stop from being reset, for people. Empty when nothing does, and without a stop."""
     @_builtins.property
     def inhibits(self) -> _containers.RepeatedScalarFieldContainer[Global___Inhibit.ValueType]:
         """Why nothing moves."""
@@ -653,10 +688,11 @@ class ActualState(_message.Message):
         counters: Global___Counters | None = ...,
         episode: Global___Episode | None = ...,
         problems: _abc.Iterable[_builtins.str] | None = ...,
+        reset_obstacle: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["counters", b"counters", "episode", b"episode", "stop", b"stop"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["applied_revision", b"applied_revision", "command_ns", b"command_ns", "counters", b"counters", "episode", b"episode", "inhibits", b"inhibits", "monotonic_ns", b"monotonic_ns", "newest_sequence", b"newest_sequence", "phase", b"phase", "problems", b"problems", "session_id", b"session_id", "speed_limit_mps", b"speed_limit_mps", "stop", b"stop", "vx_mps", b"vx_mps", "vy_mps", b"vy_mps", "wz_rad_s", b"wz_rad_s"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["applied_revision", b"applied_revision", "command_ns", b"command_ns", "counters", b"counters", "episode", b"episode", "inhibits", b"inhibits", "monotonic_ns", b"monotonic_ns", "newest_sequence", b"newest_sequence", "phase", b"phase", "problems", b"problems", "reset_obstacle", b"reset_obstacle", "session_id", b"session_id", "speed_limit_mps", b"speed_limit_mps", "stop", b"stop", "vx_mps", b"vx_mps", "vy_mps", b"vy_mps", "wz_rad_s", b"wz_rad_s"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -755,6 +791,7 @@ class Episode(_message.Message):
     DISTANCE_M_FIELD_NUMBER: _builtins.int
     TURNED_RAD_FIELD_NUMBER: _builtins.int
     ENDED_BY_FIELD_NUMBER: _builtins.int
+    RECORDED_FIELD_NUMBER: _builtins.int
     episode_id: _builtins.int
     """Counts up from 1."""
     holder: _builtins.str
@@ -769,6 +806,8 @@ class Episode(_message.Message):
     """Rotation commanded, in rad."""
     ended_by: _builtins.str
     """Why it ended, for people: "released", "the driver's picture is too old"."""
+    recorded: _builtins.bool
+    """Whether a gateway has recorded it. Until one has, it outlives the drive program."""
     def __init__(
         self,
         *,
@@ -779,11 +818,14 @@ class Episode(_message.Message):
         distance_m: _builtins.float = ...,
         turned_rad: _builtins.float = ...,
         ended_by: _builtins.str = ...,
+        recorded: _builtins.bool | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_recorded", b"_recorded", "recorded", b"recorded"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["distance_m", b"distance_m", "ended_by", b"ended_by", "ended_ns", b"ended_ns", "episode_id", b"episode_id", "holder", b"holder", "started_ns", b"started_ns", "turned_rad", b"turned_rad"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_recorded", b"_recorded", "distance_m", b"distance_m", "ended_by", b"ended_by", "ended_ns", b"ended_ns", "episode_id", b"episode_id", "holder", b"holder", "recorded", b"recorded", "started_ns", b"started_ns", "turned_rad", b"turned_rad"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    def WhichOneof(self, oneof_group: _Never) -> None: ...
+    _WhichOneofReturnType__recorded: _TypeAlias = _typing.Literal["recorded"]  # noqa: Y015
+    _WhichOneofArgType__recorded: _TypeAlias = _typing.Literal["_recorded", b"_recorded"]  # noqa: Y015
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__recorded) -> _WhichOneofReturnType__recorded | None: ...
 
 Global___Episode: _TypeAlias = Episode  # noqa: Y015

@@ -54,6 +54,21 @@ async def test_of_reports_that_come_together_the_newest_counts_and_every_time_of
     ]
 
 
+async def test_a_time_of_motion_is_acknowledged_until_the_drive_program_knows(ends: Ends) -> None:
+    ends.theirs.setblocking(False)
+    for number, recorded in ((1, None), (2, False), (3, True)):
+        message = report(number)
+        message.actual.episode.started_ns = 10 * number
+        if recorded is not None:
+            message.actual.episode.recorded = recorded
+        ends.send(message)
+    ends.client.read()
+    acknowledged = pb.ToDrive.FromString(ends.theirs.recv(1024)).recorded
+    assert (acknowledged.episode_id, acknowledged.started_ns) == (2, 20)
+    with pytest.raises(BlockingIOError):
+        ends.theirs.recv(1024)
+
+
 async def test_an_end_is_a_loss_after_what_came_before_it(ends: Ends) -> None:
     ends.send(report(1))
     ends.theirs.close()

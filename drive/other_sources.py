@@ -1,0 +1,103 @@
+"""What else commands the robot: the other inputs of the multiplexer, as the graph shows them.
+
+A reset would leave the robot to a source that has gone on publishing. Behind a locked multiplexer nothing
+shows that there is one; before it, its messages do.
+"""
+
+import logging
+import time
+from collections.abc import Container, Iterator, Sequence
+from typing import Any, Final
+
+from common.ros_node import OWN_NODES
+from drive.subscriptions import newest, subscribe, velocity_of
+from drive.values import MS, ZERO
+
+_log = logging.getLogger(__name__)
+
+_TYPES: Final = frozenset({"geometry_msgs/msg/TwistStamped", "geometry_msgs/msg/Twist"})
+_MOST: Final = 16
+"""Inputs that are listened to; any more are a mistake of the graph."""
+_LOOK_EVERY_NS: Final = 500 * MS
+_DISCOVERY_NS: Final = 3_000 * MS
+"""From the start until the multiplexer and its inputs are discovered, if there are any."""
+_COMMANDED_NS: Final = 1_000 * MS
+"""A source that has commanded motion counts as one that does for so long: twice twist_mux's usual timeout."""
+
+
+class _Input:
+    """One input of the multiplexer. Until it has been listened to for a while, doubt counts as motion."""
+
+    def __init__(self, node: Any, topic: str, type_name: str, now_ns: int) -> None:
+        self.subscription = subscribe(node, type_name, topic)
+        self._commanded_ns = now_ns
+
+    def commands(self, now_ns: int) -> bool:
+        """Takes what has arrived; returns whether motion was commanded lately."""
+        message = newest(self.subscription)
+        if message is not None and velocity_of(message) != ZERO:
+            self._commanded_ns = now_ns
+        return now_ns - self._commanded_ns <= _COMMANDED_NS
+
+
+class OtherSources:
+    """Listens to the inputs of whatever takes our velocities, without those that are ours.
+
+    Args:
+        node: of rclpy.
+        outputs: topics that our velocities are published on.
+        ours: topics on which our own velocities are seen.
+    """
+
+    def __init__(self, node: Any, outputs: Sequence[str], ours: Container[str]) -> None:
+        self._known_from_ns = time.monotonic_ns() + _DISCOVERY_NS
+        self._node = node
+        self._outputs, self._ours = outputs, ours
+        self._inputs: dict[str, _Input] = {}
+        self._found: dict[str, str] = {}
+        self._looked_ns = 0
+
+    def known(self, now_ns: int) -> bool:
+        """Whether there has been time enough to discover them."""
+        return now_ns >= self._known_from_ns
+
+    def commanding(self, now_ns: int) -> tuple[str, ...]:
+        """Returns the topics on which motion was commanded lately."""
+        if now_ns - self._looked_ns >= _LOOK_EVERY_NS:
+            self._looked_ns = now_ns
+            self._look()
+        self._follow(now_ns)
+        # All are asked, so that each takes what has arrived.
+        return tuple([topic for topic, each in self._inputs.items() if each.commands(now_ns)])
+
+    def _look(self) -> None:
+        try:
+            found = dict(self._other_inputs())
+        except (RuntimeError, UnicodeError) as error:
+            # A node that has just gone, or a name that is no text.
+            _log.debug("the inputs of the multiplexer can't be listed: %s", error)
+            return
+        if found:  # A multiplexer that is started again has the inputs that it had.
+            self._found = found
+
+    def _other_inputs(self) -> Iterator[tuple[str, str]]:
+        """Yields topic and type of each velocity that the takers of ours take, too."""
+        for output in self._outputs:
+            for taker in self._node.get_subscriptions_info_by_topic(output):
+                if taker.node_name in OWN_NODES:
+                    continue
+                for topic, types in self._node.get_subscriber_names_and_types_by_node(
+                    taker.node_name, taker.node_namespace
+                ):
+                    if topic not in self._ours and (known := _TYPES.intersection(types)):
+                        yield topic, min(known)
+
+    def _follow(self, now_ns: int) -> None:
+        """Adds one input that is missing, or removes one: each takes the middleware a few milliseconds."""
+        for topic in self._inputs.keys() - self._found.keys():
+            self._node.destroy_subscription(self._inputs.pop(topic).subscription)
+            return
+        for topic in self._found.keys() - self._inputs.keys():
+            if len(self._inputs) < _MOST:
+                self._inputs[topic] = _Input(self._node, topic, self._found[topic], now_ns)
+            return

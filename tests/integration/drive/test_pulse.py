@@ -1,0 +1,172 @@
+"""`robot-drive doctor --pulse`: what forbids it, what ends it, and that its last word is zero."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import psutil
+import pytest
+
+from common.ros_node import message_class, ros_node
+from tests.integration.drive.test_commands import findings
+from tests.support.driving import Driving, driving
+from tests.support.promise import keeps
+from tests.support.waiting import wait_until
+
+pytestmark = [pytest.mark.ros, pytest.mark.timed]
+
+END_S = 60
+
+
+@contextmanager
+def doctor(robot: Driving) -> Iterator["subprocess.Popen[str]"]:
+    """The doctor, on its way to a pulse."""
+    command = [sys.executable, "-m", "drive.cli", "doctor", "--pulse", "--json"]
+    command += ["--config", str(robot.directory / "drive.yaml")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def found(process: "subprocess.Popen[str]") -> str:
+    """What the doctor says of the pulse."""
+    output, _ = process.communicate(timeout=END_S)
+    done = subprocess.CompletedProcess(process.args, process.returncode, output)
+    return findings(done)["pulse"]["what"]
+
+
+def wait_for_motion(
+    robot: Driving, process: "subprocess.Popen[str]", meanwhile: Callable[[], None] = lambda: None
+) -> None:
+    """Waits until the pulse moves the robot."""
+
+    def begun() -> bool:
+        meanwhile()
+        return robot.witness.moves() or process.poll() is not None
+
+    wait_until(begun, "the pulse", END_S)
+    assert process.poll() is None, f"it has ended: {found(process)}"
+
+
+def moved_since(robot: Driving, since_ns: int) -> bool:
+    return bool(robot.witness.motion_since(since_ns))
+
+
+def test_driving_that_is_disabled_forbids_it(robot: Driving) -> None:
+    robot.ready().send(enabled=False)
+    robot.phase_is("DISABLED")
+    began_ns = time.monotonic_ns()
+    with doctor(robot) as process:
+        assert found(process) == "the pulse was left out: driving is disabled"
+    assert not moved_since(robot, began_ns)
+
+
+def test_a_stop_that_is_latched_forbids_it_also_while_the_drive_program_does_not_run(robot: Driving) -> None:
+    robot.ready().send(stop="ben")
+    robot.phase_is("STOPPED")
+    assert robot.guard
+    robot.guard.terminate()
+    robot.guard.wait(END_S)
+    wait_until(lambda: robot.observer.state() is None, "the drive program has gone")
+    began_ns = time.monotonic_ns()
+    with doctor(robot) as process:
+        expected = "the pulse was left out: the robot was stopped by ben, and robot-drive does not run"
+        assert found(process) == expected
+    assert not moved_since(robot, began_ns)
+
+
+def test_a_drive_program_that_cant_be_asked_forbids_it(robot: Driving, tmp_path: Path) -> None:
+    robot.ready()
+    began_ns = time.monotonic_ns()
+    elsewhere = tmp_path / "other.sock"
+    command = [sys.executable, "-m", "drive.cli", "doctor", "--pulse", "--json"]
+    done = subprocess.run(
+        command,
+        env=os.environ | {"DRIVE__SOCKET": str(elsewhere)},
+        capture_output=True,
+        text=True,
+        timeout=END_S,
+        check=False,
+    )
+    expected = f"the pulse was left out: robot-drive runs, but nothing listens at {elsewhere}"
+    assert findings(done)["pulse"]["what"] == expected
+    assert not moved_since(robot, began_ns)
+
+
+def test_the_robots_own_stop_forbids_it_and_ends_it(tmp_path: Path, ros_domain: int) -> None:  # noqa: ARG001
+    boolean = message_class("std_msgs/msg/Bool")
+    with driving(tmp_path, stop_topics=["/stop_button"]) as robot, ros_node("button") as button:
+        publisher = button.create_publisher(boolean, "/stop_button", 1)
+        robot.ready()
+        began_ns = time.monotonic_ns()
+        with doctor(robot) as process:
+            assert "left out: the robot's own stop is active on /stop_button" in found(process)
+        assert not moved_since(robot, began_ns)
+        with doctor(robot) as process:
+            wait_for_motion(robot, process, lambda: publisher.publish(boolean(data=False)))
+            publisher.publish(boolean(data=True))
+            assert "ended early: the robot's own stop is active" in found(process)
+        robot.settled()
+        assert not robot.witness.moves()
+
+
+def test_a_stop_ends_it(robot: Driving) -> None:
+    def stop() -> float:
+        peer = robot.ready()
+        with doctor(robot) as process:
+            wait_for_motion(robot, process)
+            began_ns = time.monotonic_ns()
+            peer.send(stop="ben")
+            assert found(process) == "the pulse was ended early: the robot was stopped by ben"
+        robot.settled()
+        return robot.witness.zero_after_ms(began_ns)
+
+    keeps(50, "stop in a pulse, ms", stop)
+
+
+def test_a_driver_ends_it(robot: Driving) -> None:
+    peer = robot.ready()
+    with doctor(robot) as process:
+        wait_for_motion(robot, process)
+        peer.send(lease="anna", held=False)
+        assert found(process) == "the pulse was ended early: a driver has the robot"
+    robot.settled()
+    assert not robot.witness.moves()
+
+
+@pytest.mark.parametrize(
+    ("who", "number", "moment"),
+    [
+        ("doctor", signal.SIGKILL, "in motion"),
+        ("doctor", signal.SIGKILL, "in silence"),
+        ("doctor", signal.SIGSTOP, "in motion"),
+        ("doctor", signal.SIGTERM, "in motion"),
+        ("doctor", signal.SIGINT, "in silence"),
+        ("pulse", signal.SIGKILL, "in motion"),
+        ("pulse", signal.SIGSTOP, "in motion"),
+        ("pulse", signal.SIGSTOP, "in silence"),
+    ],
+)
+def test_whatever_ends_it_the_last_message_is_zero(
+    robot: Driving, who: str, number: signal.Signals, moment: str
+) -> None:
+    robot.ready()
+    with doctor(robot) as process:
+        wait_for_motion(robot, process)
+        if moment == "in silence":
+            wait_until(lambda: time.monotonic_ns() - robot.witness.seen[-1][0] > 100_000_000, "the silence")
+            assert robot.witness.moves()
+        (pulse,) = psutil.Process(process.pid).children()
+        os.kill(process.pid if who == "doctor" else pulse.pid, number)
+        wait_until(lambda: not robot.witness.moves(), "zero", 5)
+        robot.settled()
+        assert not robot.witness.moves()
+        process.kill()
+    psutil.wait_procs([pulse], timeout=END_S)
