@@ -157,18 +157,21 @@ def test_the_preview_does_its_job(tmp_path: Path) -> None:
         assert run("docker", "inspect", "--format", "{{.State.ExitCode}}", name) == "0"
 
 
-@pytest.mark.usefixtures("built")
-@pytest.mark.parametrize(
-    ("image", "program"), [("robot-preview", "robot-preview"), ("robot-bridge", "robot-bridge")]
-)
-def test_the_shipped_configuration_is_accepted(image: str, program: str) -> None:
-    name = program.removeprefix("robot-")
-    run(
-        "docker", "run", "--rm", "--platform", PLATFORM, "--network", "none",
-        "--volume", f"{ROOT}/docker/config/{name}.yaml:/etc/robot-gateway/{name}.yaml:ro",
-        f"{image}:test-arm64", program, "check", "--config", f"/etc/robot-gateway/{name}.yaml",
-        within_s=STARTED_WITHIN_S,
+def checked(name: str) -> "subprocess.CompletedProcess[str]":
+    """What a program in its image says of the configuration that is shipped with it."""
+    return subprocess.run(
+        ["docker", "run", "--rm", "--platform", PLATFORM, "--network", "none",
+         "--volume", f"{ROOT}/docker/config/{name}.yaml:/etc/robot-gateway/{name}.yaml:ro",
+         f"robot-{name}:test-arm64", f"robot-{name}", "check", "--config", f"/etc/robot-gateway/{name}.yaml"],
+        capture_output=True, text=True, timeout=STARTED_WITHIN_S, check=False,
     )  # fmt: skip
+
+
+@pytest.mark.usefixtures("built")
+def test_the_shipped_configurations_are_read() -> None:
+    assert checked("preview").returncode == 0
+    # Until the robot is enrolled, this is what is missing.
+    assert "hub.ca: /etc/robot-bridge/ca.pem" in checked("bridge").stderr
 
 
 def test_the_console_is_installed_and_calls_a_gateway(tree: Path, tmp_path: Path) -> None:
