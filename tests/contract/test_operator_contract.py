@@ -1,6 +1,6 @@
 """The behaviour that operators' tools in the field rely on, over raw stubs: the real gateway's, the double's.
 
-What a robot's health is made of needs a robot: tests/integration/ros has it.
+What a robot's health is made of needs a robot: tests/integration/gateway/ros has it.
 """
 
 import asyncio

@@ -134,7 +134,7 @@ def test_what_a_robot_without_credentials_accepted_ends_with_the_overlay() -> No
     ("program", "profile"), [("gateway", ""), ("drive", "drive"), ("recorder", "record")]
 )
 def test_what_speaks_ros_is_where_the_robots_nodes_are(program: str, profile: str) -> None:
-    """And shares no memory with them: they are other users (tests/integration/ros/test_other_users.py)."""
+    """And shares no memory with them: they are other users (gateway/ros/test_other_users.py)."""
     service = config(profile=profile)["services"][program]
     assert service["network_mode"] == "host"
     assert "ipc" not in service

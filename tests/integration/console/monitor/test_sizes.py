@@ -13,7 +13,7 @@ from tests.support.qt import KEPT_IN
 
 pytestmark = [pytest.mark.gst, pytest.mark.timeout(180)]
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 ENDS_WITHIN_S = 150
 
 

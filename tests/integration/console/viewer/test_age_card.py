@@ -13,7 +13,7 @@ from console.viewer.picture_meter import PictureMeter
 from console.window.age_card import AgeCard
 from console.window.theme import COLOURS
 from tests.support.qt import application
-from tests.unit.receiver.frames import frame
+from tests.unit.console.receiver.frames import frame
 
 GROUND = QColor("#446677")
 WIDTH, HEIGHT = 640, 240

@@ -12,13 +12,13 @@ from console.receiver.address import StreamAddress
 from console.receiver.recording import Recording
 from console.viewer.playback import PlaybackState
 from console.viewer.session import VideoSession
-from tests.integration.viewer.conftest import following
+from tests.integration.console.viewer.conftest import following
 from tests.support.free import free_udp_port
 from tests.support.judges import decoded_frames
 from tests.support.streams import SrtSender, encode
 from tests.support.video_ground import VideoGround, video_ground
 from tests.support.waiting import wait_until
-from tests.unit.viewer.previews import preview
+from tests.unit.console.viewer.previews import preview
 
 pytestmark = pytest.mark.gst
 

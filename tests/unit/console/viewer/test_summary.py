@@ -10,7 +10,7 @@ from console.receiver.frame import Frame
 from console.receiver.recording import Recording
 from console.viewer.formatting import delivery_text, figures_line, recording_line
 from console.viewer.summary import FrameCounter
-from tests.unit.receiver.frames import frame
+from tests.unit.console.receiver.frames import frame
 
 MIB = 1 << 20
 

@@ -7,7 +7,7 @@ from console.client import NotAllowed, NotTrusted, Unreachable
 from console.client.results import PreviewState
 from console.viewer.formatting import banner
 from console.viewer.playback import FROZEN_AFTER_S, PlaybackInputs, PlaybackState, playback
-from tests.unit.viewer.previews import preview
+from tests.unit.console.viewer.previews import preview
 
 NOW_S = 1000.0
 GONE = Unreachable("no robot gateway at robot:50051")

@@ -8,7 +8,7 @@ from console.client import Offset, PictureDelivery
 from console.receiver.delivery import Delivery, DeliveryChoice
 from console.viewer.picture_meter import HISTORY_SLOTS, PictureMeter
 from console.viewer.picture_reading import AgeCause
-from tests.unit.receiver.frames import frame
+from tests.unit.console.receiver.frames import frame
 
 OFFSET_S = 3600.0
 

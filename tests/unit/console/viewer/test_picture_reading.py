@@ -8,7 +8,7 @@ from console.client.results import PreviewMeasurement, PreviewState, PreviewStat
 from console.presentation.severity_style import SeverityStyle
 from console.receiver.delivery import Delivery, DeliveryChoice
 from console.viewer.picture_reading import AgeCause, PictureReading, ShownPicture, reading
-from tests.unit.viewer.previews import preview
+from tests.unit.console.viewer.previews import preview
 
 NOW_S = 1000.0
 DIRECT = Delivery(kind=DeliveryChoice.DIRECT, rtt_ms=20.4, loss_percent=1.25)

@@ -5,7 +5,7 @@ from console.receiver.address import StreamAddress
 from console.receiver.errors import ended
 from console.receiver.frame import Frame
 from console.receiver.frame_queue import FrameQueue
-from tests.unit.receiver.frames import frame
+from tests.unit.console.receiver.frames import frame
 
 ADDRESS = StreamAddress("robot")
 

@@ -5,7 +5,7 @@ import pytest
 from common.errors import UserError
 from console.client.results import PreviewState, StreamTransport
 from console.viewer.redial import BLOCKED_PAUSE_S, address_of, deadline_s, redial_backoff
-from tests.unit.viewer.previews import NOTHING_KNOWN, preview
+from tests.unit.console.viewer.previews import NOTHING_KNOWN, preview
 
 
 def test_everything_comes_from_the_endpoint() -> None:

@@ -112,7 +112,7 @@ def test_a_topic_at_1000_hz_is_read_at_the_samplers_pace(tmp_path: Path) -> None
 
 @pytest.mark.usefixtures("ros_domain")
 def test_a_topic_every_five_seconds_keeps_its_value_between(tmp_path: Path) -> None:
-    """tests/integration/ros/test_rates.py has one of ten seconds, through the whole program."""
+    """tests/integration/gateway/ros/test_rates.py has one of ten seconds, through the whole program."""
     board = Board()
     with intake([ODOMETRY], board), simulated_robot(tmp_path, "--odometry-hz", "0.2"):
         first = wait_until(lambda: board[specs.ODOMETRY], "the first message", within_s=40)

@@ -51,7 +51,7 @@ print("untouched")
 """
     done = subprocess.run(
         [sys.executable, "-c", program],
-        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])},
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[4])},
         capture_output=True,
         text=True,
         timeout=60,
@@ -77,7 +77,7 @@ def test_a_middleware_that_is_not_installed_is_refused_in_one_line(
         [sys.executable, "-c", command, "serve" if "gateway" in command else "run"],
         env=os.environ
         | {
-            "PYTHONPATH": str(Path(__file__).parents[3]),
+            "PYTHONPATH": str(Path(__file__).parents[4]),
             "RMW_IMPLEMENTATION": middleware,
             "GATEWAY__GRPC__PORT": "0",
             "GATEWAY__PREVIEW__SOCKET": str(tmp_path / "preview.sock"),

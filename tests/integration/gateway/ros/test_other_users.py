@@ -15,7 +15,7 @@ from tests.support.waiting import wait_until
 
 pytestmark = [pytest.mark.ros]
 
-COMPOSE = Path(__file__).parents[3] / "compose.yaml"
+COMPOSE = Path(__file__).parents[4] / "compose.yaml"
 ROOT_USER = (0, 0)
 
 

@@ -2,7 +2,7 @@ import dataclasses
 
 import pytest
 
-from tests.unit.receiver.frames import frame
+from tests.unit.console.receiver.frames import frame
 
 
 def test_its_pixels_are_read_as_they_are() -> None:

@@ -21,7 +21,7 @@ from tests.support.waiting import wait_until
 
 pytestmark = pytest.mark.gst
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 DOUBLES = ROOT / "tests/support/decoder_doubles"
 
 

@@ -1,4 +1,4 @@
-"""The session with calls that the test plays; real streams are in tests/integration/viewer."""
+"""The session with calls that the test plays; real streams are in tests/integration/console/viewer."""
 
 import time
 from collections.abc import Iterator
@@ -17,8 +17,8 @@ from console.receiver.options import ReceiverOptions
 from console.viewer.playback import PlaybackState
 from console.viewer.session import VideoSession
 from tests.support.waiting import wait_until
-from tests.unit.receiver.frames import frame
-from tests.unit.viewer.previews import preview
+from tests.unit.console.receiver.frames import frame
+from tests.unit.console.viewer.previews import preview
 
 
 @dataclass

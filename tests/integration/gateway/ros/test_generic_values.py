@@ -264,7 +264,7 @@ def test_from_the_configuration_to_the_operator(talker: Talker, tmp_path: Path) 
         assert "has no field 'temp'" in (tmp_path / "gateway.log").read_text(encoding="utf-8")
 
 
-PAGE = Path(__file__).parents[3] / "docs/configuration.md"
+PAGE = Path(__file__).parents[4] / "docs/configuration.md"
 
 
 def examples() -> list[str]:
