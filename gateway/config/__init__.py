@@ -1,17 +1,16 @@
 """The gateway's settings, one module per section; docs/configuration.md describes every key."""
 
 from gateway.config.faults import FaultSettings
+from gateway.config.links import PreviewSettings, TeleopSettings
 from gateway.config.security import AuditSettings, SecuritySettings, TlsSettings
 from gateway.config.serving import GrpcSettings, LimitSettings, MetricsSettings, is_loopback
 from gateway.config.settings import (
     CONFIG_VARIABLE,
     GatewaySettings,
     PlatformSettings,
-    PreviewSettings,
     load_settings,
 )
 from gateway.config.sources import DEFAULT_SOURCES, SourceSettings
-from gateway.config.teleop import TeleopSettings
 
 __all__ = [
     "CONFIG_VARIABLE",

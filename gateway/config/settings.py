@@ -8,10 +8,9 @@ from pydantic import Field
 from pydantic_settings import SettingsConfigDict
 
 from common.config import Section, Settings, SettingsConflictError, load
-from gateway.config.bridge import BridgeSettings
 from gateway.config.faults import FaultSettings
 from gateway.config.generic_sources import MOST_GENERIC
-from gateway.config.recording import RecordingSettings
+from gateway.config.links import BridgeSettings, PreviewSettings, RecordingSettings, TeleopSettings
 from gateway.config.security import SecuritySettings
 from gateway.config.serving import (
     DiscoverySettings,
@@ -21,25 +20,11 @@ from gateway.config.serving import (
     is_loopback,
 )
 from gateway.config.sources import DEFAULT_SOURCES, SourceSettings
-from gateway.config.teleop import TeleopSettings
 from gateway.status.snapshot import Rules, SourceRule
 from gateway.status.sources import MUX_INPUTS
 
 CONFIG_VARIABLE: Final = "ROBOT_GATEWAY_CONFIG"
 """Environment variable with the path of the file, where the command line has none."""
-
-
-class PreviewSettings(Section):
-    """The connection to the preview service, and from viewers to its stream."""
-
-    socket: Path = Path("/run/robot-gateway/preview.sock")
-    settle_ms: int = Field(default=4000, ge=0, le=60_000)
-    """How long SetPreviewMode waits for the requested state before it returns the present one."""
-    advertised_host: str | None = Field(default=None, min_length=1)
-    """Host of the stream for viewers; by default the address at which the caller reached the gateway."""
-    encrypted: bool | None = None
-    """Whether each session gets its own passphrase; the preview's configuration sets the key length.
-    `GatewaySettings.encrypts_preview` has the default."""
 
 
 class PlatformSettings(Section):

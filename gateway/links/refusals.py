@@ -5,16 +5,26 @@ import logging
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Final, TypeAlias, TypeVar
 
 import grpc
 
-from common.errors import DefectError, DomainError
+from common.errors import DefectError, DomainError, InvalidRequestError, NotFoundError
 from common.reasons import Reason
 from common.refusal import refusal_in
 from gateway.links.grpc_client import GONE
 from gateway.links.watch import ABSENT
 
 _log = logging.getLogger(__name__)
+
+ClientT = TypeVar("ClientT")
+ByCode: TypeAlias = Mapping[grpc.StatusCode, tuple[Callable[[str, Reason], DomainError], Reason]]
+
+OF_ANY_SERVICE: Final[ByCode] = {
+    grpc.StatusCode.NOT_FOUND: (NotFoundError, Reason.RECORDING_NOT_FOUND),
+    grpc.StatusCode.INVALID_ARGUMENT: (lambda text, _: InvalidRequestError(text), Reason.INVALID_REQUEST),
+}
+"""What services with recordings refuse alike."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +38,7 @@ class Refusals:
     """
 
     name: str
-    by_code: Mapping[grpc.StatusCode, tuple[Callable[[str, Reason], DomainError], Reason]]
+    by_code: ByCode
     unreachable: Callable[[str], DomainError]
 
     def refused(self, error: grpc.aio.AioRpcError) -> DomainError:
@@ -46,10 +56,16 @@ class Refusals:
         return refusal
 
     @contextmanager
-    def as_domain_errors(self) -> Iterator[None]:
-        """Turns the errors of a call into the gateway's own; a task that is cancelled stays cancelled."""
+    def calling(self, client: ClientT | None) -> Iterator[ClientT]:
+        """Yields the client of the present connection. A task that is cancelled stays cancelled.
+
+        Raises:
+            DomainError: there is no connection, or a call of the block has failed.
+        """
+        if client is None:
+            raise self.unreachable(ABSENT)
         try:
-            yield
+            yield client
         except grpc.aio.AioRpcError as error:
             raise self.refused(error) from None
         except asyncio.CancelledError:

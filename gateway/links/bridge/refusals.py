@@ -6,13 +6,11 @@ import grpc
 
 from common.errors import (
     BridgeUnreachableError,
-    InvalidRequestError,
-    NotFoundError,
     PreconditionError,
     TooMuchError,
 )
 from common.reasons import Reason
-from gateway.links.refusals import Refusals
+from gateway.links.refusals import OF_ANY_SERVICE, Refusals
 
 
 def unreachable(why: str) -> BridgeUnreachableError:
@@ -25,13 +23,9 @@ def unreachable(why: str) -> BridgeUnreachableError:
 REFUSALS: Final = Refusals(
     "the robot's bridge",
     {
-        grpc.StatusCode.NOT_FOUND: (NotFoundError, Reason.RECORDING_NOT_FOUND),
+        **OF_ANY_SERVICE,
         grpc.StatusCode.FAILED_PRECONDITION: (PreconditionError, Reason.RECORDING_RUNS),
         grpc.StatusCode.RESOURCE_EXHAUSTED: (TooMuchError, Reason.TOO_MANY_UPLOADS),
-        grpc.StatusCode.INVALID_ARGUMENT: (
-            lambda text, _: InvalidRequestError(text),
-            Reason.INVALID_REQUEST,
-        ),
     },
     unreachable,
 )

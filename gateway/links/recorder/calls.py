@@ -7,9 +7,9 @@ from typing import Final
 from common.errors import DamagedError
 from common.open_file import Chunk, UnreadableError
 from gateway.links.grpc_client import call_metadata
-from gateway.links.recorder.refusals import REFUSALS, unreachable
+from gateway.links.recorder.refusals import REFUSALS
 from gateway.links.recorder.wire import RecorderClient
-from gateway.links.watch import ABSENT, SharingConnector
+from gateway.links.watch import SharingConnector
 from gateway.status.cloud import CopyReport
 from gateway.status.fault import Condition
 
@@ -36,8 +36,8 @@ class RecorderCalls(SharingConnector[RecorderClient]):
         timeout_s = _LONGER_S.get(method, _ANSWER_WITHIN_S)
         if remaining_s is not None:
             timeout_s = min(timeout_s, remaining_s)
-        with REFUSALS.as_domain_errors():
-            return await self._connected().call(method, request, timeout_s, call_metadata(caller))
+        with REFUSALS.calling(self._client) as recorder:
+            return await recorder.call(method, request, timeout_s, call_metadata(caller))
 
     async def export(self, request: bytes, caller: str) -> AsyncGenerator[bytes | Chunk]:
         """Passes an export on: yields its responses, serialised, or chunks of the file, each as it is taken.
@@ -45,13 +45,13 @@ class RecorderCalls(SharingConnector[RecorderClient]):
         Raises:
             DomainError: the recorder refuses, or is gone.
         """
-        async with aclosing(self._connected().export(request, call_metadata(caller))) as responses:
-            try:
-                with REFUSALS.as_domain_errors():
+        try:
+            with REFUSALS.calling(self._client) as recorder:
+                async with aclosing(recorder.export(request, call_metadata(caller))) as responses:
                     async for response in responses:
                         yield response
-            except UnreadableError as error:
-                raise DamagedError(f"the file on the robot: {error}") from error
+        except UnreadableError as error:
+            raise DamagedError(f"the file on the robot: {error}") from error
 
     async def report_fault(self, fault: Condition) -> str:
         """Reports a fault; returns the incident that it became, empty for none.
@@ -59,8 +59,8 @@ class RecorderCalls(SharingConnector[RecorderClient]):
         Raises:
             DomainError: the recorder refuses, or does not answer.
         """
-        with REFUSALS.as_domain_errors():
-            return await self._connected().report_fault(
+        with REFUSALS.calling(self._client) as recorder:
+            return await recorder.report_fault(
                 fault.fault_id, fault.severity, fault.message, _ANSWER_WITHIN_S
             )
 
@@ -70,10 +70,5 @@ class RecorderCalls(SharingConnector[RecorderClient]):
         Raises:
             DomainError: the recorder refuses, or does not answer.
         """
-        with REFUSALS.as_domain_errors():
-            await self._connected().set_copy(report, _ANSWER_WITHIN_S)
-
-    def _connected(self) -> RecorderClient:
-        if self._client is None:
-            raise unreachable(ABSENT)
-        return self._client
+        with REFUSALS.calling(self._client) as recorder:
+            await recorder.set_copy(report, _ANSWER_WITHIN_S)

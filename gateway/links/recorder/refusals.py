@@ -7,14 +7,12 @@ import grpc
 from common.errors import (
     ConflictError,
     DamagedError,
-    InvalidRequestError,
-    NotFoundError,
     PreconditionError,
     RecorderUnreachableError,
     TooMuchError,
 )
 from common.reasons import Reason
-from gateway.links.refusals import Refusals
+from gateway.links.refusals import OF_ANY_SERVICE, Refusals
 
 
 def unreachable(why: str) -> RecorderUnreachableError:
@@ -27,14 +25,10 @@ def unreachable(why: str) -> RecorderUnreachableError:
 REFUSALS: Final = Refusals(
     "the robot's recorder",
     {
-        grpc.StatusCode.NOT_FOUND: (NotFoundError, Reason.RECORDING_NOT_FOUND),
+        **OF_ANY_SERVICE,
         grpc.StatusCode.FAILED_PRECONDITION: (PreconditionError, Reason.RECORDER_NOT_READY),
         grpc.StatusCode.ABORTED: (ConflictError, Reason.RECORDING_CHANGED),
         grpc.StatusCode.RESOURCE_EXHAUSTED: (TooMuchError, Reason.DISK_FULL),
-        grpc.StatusCode.INVALID_ARGUMENT: (
-            lambda text, _: InvalidRequestError(text),
-            Reason.INVALID_REQUEST,
-        ),
         grpc.StatusCode.DATA_LOSS: (lambda text, _: DamagedError(text), Reason.RECORDING_DAMAGED),
     },
     unreachable,
