@@ -7,19 +7,19 @@ from contextlib import aclosing
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from bridge.commands.desk import Desk
-from bridge.commands.taker import CommandTaker
+from bridge.commands.consumer import CommandConsumer
+from bridge.commands.pending_requests import PendingRequests
 from bridge.config import BridgeSettings
+from bridge.connection_status import Status
 from bridge.outbox.outbox import Outbox, outbox
 from bridge.outbox.uploads import StoredUploads
 from bridge.robot.calls import GatewayCalls
 from bridge.robot.events import EventReader
 from bridge.robot.status import StatusReader
+from bridge.robot_state import is_charging
 from bridge.rpc.servicer import SERVICE, BridgeServicer
 from bridge.sender import Sender
-from bridge.state import is_charging
 from bridge.state_sender import StateSender
-from bridge.status import Status
 from bridge.uploading import NoUploads, QueuedUploads, Uploading, apply_rule
 from common import bind, heartbeat, rpc
 from common.health import Health
@@ -62,7 +62,7 @@ async def serve(settings: BridgeSettings, stop: asyncio.Event) -> None:
             uploads=uploads,
             gateway=lambda: robot_status.error,
         )
-        desk = Desk(robot, kept, status.changes.notify_all)
+        requests = PendingRequests(robot, kept, status.changes.notify_all)
         states = StateSender(
             robot,
             settings.advertised_target,
@@ -81,9 +81,9 @@ async def serve(settings: BridgeSettings, stop: asyncio.Event) -> None:
         if queue:
             parts += [partial(queue.run, stop), partial(apply_rule, queue, gateway)]
         if settings.commands.allowed:
-            parts.append(CommandTaker(settings, hub, desk).run)
+            parts.append(CommandConsumer(settings, hub, requests).run)
         server = rpc.new_server()
-        BridgeServicer(run_id, status, uploads, desk).register(server)
+        BridgeServicer(run_id, status, uploads, requests).register(server)
         Health(SERVICE).register(server)
         bind.bind_unix(server, settings.socket)
         await server.start()

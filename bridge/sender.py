@@ -12,8 +12,8 @@ import time
 from collections.abc import Awaitable, Callable
 
 from bridge.encoding import batch_message
+from bridge.jittered_backoff import JitteredBackoff
 from bridge.outbox.outbox import Outbox
-from bridge.pauses import Pauses
 from bridge.values import OutboxError
 from fleet.connection import Hub, Published
 from fleet.errors import HubError
@@ -51,7 +51,7 @@ class Sender:
             group.create_task(self._keep_sending(self._send_result), name="send-results")
 
     async def _keep_sending(self, send: Callable[[], Awaitable[bool]]) -> None:
-        pauses = Pauses()
+        backoff = JitteredBackoff()
         while True:
             before = self._outbox.facts, self._outbox.results
             try:
@@ -60,12 +60,12 @@ class Sender:
                     await self._outbox.changes.wait_until(
                         lambda: before != (self._outbox.facts, self._outbox.results)  # noqa: B023  # awaited here
                     )
-                pauses.reset()
+                backoff.reset()
             except (HubError, OutboxError) as error:
                 self.failures += 1
                 self.error = str(error)
                 _log.info("it is sent again later: %s", error)
-                await pauses.wait()
+                await backoff.wait()
 
     async def _send_batch(self) -> bool:
         """Sends a batch. Returns False if there is none."""

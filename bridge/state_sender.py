@@ -4,10 +4,10 @@ import asyncio
 import logging
 import time
 
+from bridge.jittered_backoff import JitteredBackoff
 from bridge.outbox.outbox import Outbox
-from bridge.pauses import Pauses
 from bridge.robot.status import StatusReader
-from bridge.state import MIN_INTERVAL_S, Own, due_in_s, robot_state, same_but_for_time
+from bridge.robot_state import MIN_INTERVAL_S, Own, due_in_s, robot_state, same_but_for_time
 from bridge.uploading import Uploading
 from common.version import project_version
 from fleet.connection import Hub
@@ -49,7 +49,7 @@ class StateSender:
 
     async def run(self) -> None:
         """Sends on a change at most once a second, otherwise every 10 s."""
-        pauses = Pauses()
+        backoff = JitteredBackoff()
         last, sent_s = b"", float("-inf")
         while True:
             await self._hub.connected()
@@ -64,10 +64,10 @@ class StateSender:
                 await self._put(state)
             except HubError as error:
                 _log.info("the robot's state was not taken: %s", error)
-                await pauses.wait()
+                await backoff.wait()
             else:
                 last, sent_s = key, time.monotonic()
-                pauses.reset()
+                backoff.reset()
 
     async def _put(self, state: RobotState) -> None:
         state.bridge_run_id = self._run_id

@@ -5,7 +5,7 @@ import logging
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, Protocol
 
-from bridge.pauses import Pauses
+from bridge.jittered_backoff import JitteredBackoff
 from bridge.robot.calls import GatewayCalls
 from bridge.uploads.queue import RUNNING, State, Upload
 from common.errors import DomainError, NotFoundError, PreconditionError, RecorderUnreachableError
@@ -150,7 +150,7 @@ class QueuedUploads:
 
 async def apply_rule(uploads: "Uploads", gateway: GatewayCalls) -> None:
     """Has the uploads look at the robot's recordings every 30 s, until cancelled."""
-    pauses = Pauses()
+    backoff = JitteredBackoff()
     while True:
         try:
             token = ""
@@ -163,9 +163,9 @@ async def apply_rule(uploads: "Uploads", gateway: GatewayCalls) -> None:
                     break
         except GatewayError as error:
             _log.info("the robot's recordings can't be listed: %s", error)
-            await pauses.wait()
+            await backoff.wait()
         else:
-            pauses.reset()
+            backoff.reset()
             await asyncio.sleep(_LOOK_S)
 
 

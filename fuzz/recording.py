@@ -18,14 +18,14 @@ from mcap.records import Metadata
 from common.errors import DomainError
 from common.video_tap import HEADER_BYTES, MalformedRecordError, decode_header
 from omniseer.gateway.v1 import recording_pb2 as pb
+from recorder.assembly import build
 from recorder.config import RecorderSettings
 from recorder.mcap.reading import summarise
 from recorder.mcap.records import bytes_of
 from recorder.mcap.recovery import recover
 from recorder.mcap.scan import RECORD, new_head
-from recorder.parts import parts_of
-from recorder.readings import Readings
 from recorder.rpc.servicer import RecorderServicer
+from recorder.status_reader import StatusReader
 from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason
 from recorder.store.readers import reader_threads
 from recorder.values import Loss, Note, Sample
@@ -154,7 +154,7 @@ def _robot() -> tuple[asyncio.AbstractEventLoop, ExitStack, RecorderServicer, by
 
     async def made() -> tuple[RecorderServicer, bytes]:
         settings = RecorderSettings(root=root)
-        parts = parts_of(
+        parts = build(
             settings,
             SampleQueue(settings.queue_bytes),
             NoSources(),
@@ -170,7 +170,7 @@ def _robot() -> tuple[asyncio.AbstractEventLoop, ExitStack, RecorderServicer, by
         assert found
         parts.catalogue.write(manifest.with_segment(FILE, found))
         operations: Any = None
-        servicer = RecorderServicer(operations, Readings(parts), settings, readers)
+        servicer = RecorderServicer(operations, StatusReader(parts), settings, readers)
         return servicer, found.path.read_bytes()
 
     servicer, content = loop.run_until_complete(made())

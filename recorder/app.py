@@ -10,15 +10,15 @@ from pathlib import Path
 from common import bind, heartbeat, rpc
 from common.boot import boot_id
 from common.health import Health
+from recorder.assembly import build
 from recorder.config import RecorderSettings
 from recorder.operations import Operations
-from recorder.parts import parts_of
 from recorder.priority import step_back
-from recorder.readings import Readings
 from recorder.recorder import Recorder
 from recorder.rpc.export_connections import ExportConnections
 from recorder.rpc.servicer import SERVICE, RecorderServicer
 from recorder.sources import RobotSources
+from recorder.status_reader import StatusReader
 from recorder.store.lock import folder_lock
 from recorder.store.readers import reader_threads
 from recorder.writing.queue import SampleQueue
@@ -41,7 +41,7 @@ async def serve(settings: RecorderSettings, stop: asyncio.Event) -> None:
         for folder in _own_folders(settings):
             locks.enter_context(folder_lock(folder))
         async with RobotSources(settings, queue) as sources:
-            parts = parts_of(
+            parts = build(
                 settings,
                 queue,
                 sources,
@@ -49,13 +49,13 @@ async def serve(settings: RecorderSettings, stop: asyncio.Event) -> None:
                 boot_id=boot_id(),
                 run_id=secrets.token_hex(_RUN_ID_BYTES),
             )
-            readings = Readings(parts)
-            recorder = Recorder(parts, readings)
-            operations = Operations(parts, readings, recorder)
+            status_reader = StatusReader(parts)
+            recorder = Recorder(parts, status_reader)
+            operations = Operations(parts, status_reader, recorder)
             server = rpc.new_server()
             connections = ExportConnections()
             with reader_threads() as readers:
-                servicer = RecorderServicer(operations, readings, settings, readers, connections)
+                servicer = RecorderServicer(operations, status_reader, settings, readers, connections)
                 servicer.register(server)
                 Health(SERVICE).register(server)
                 bind.bind_unix(server, settings.socket)

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Final
 
 from recorder.config import RecorderSettings
-from recorder.life import Life
 from recorder.lifecycle import Event, State
+from recorder.lifecycle_runner import LifecycleRunner
 from recorder.outputs import Outputs, Sources
 from recorder.requests import Live
 from recorder.store.catalogue import Catalogue, first_free_number
@@ -36,7 +36,7 @@ class ManualRecorder:
 
     Args:
         settings: of the program.
-        life: which it moves from STARTING to IDLE, or to FAULTED.
+        lifecycle: which it moves from STARTING to IDLE, or to FAULTED.
         catalogue: has the recordings.
         outputs: has the recording's while it is written.
         writer: writes it.
@@ -53,7 +53,7 @@ class ManualRecorder:
     def __init__(
         self,
         settings: RecorderSettings,
-        life: Life,
+        lifecycle: LifecycleRunner,
         catalogue: Catalogue,
         outputs: Outputs,
         writer: Writer,
@@ -64,7 +64,7 @@ class ManualRecorder:
         boot_id: str,
     ) -> None:
         self._settings = settings
-        self._life = life
+        self._lifecycle = lifecycle
         self._catalogue = catalogue
         self._state_file = state_file
         self._reserve = reserve
@@ -84,7 +84,7 @@ class ManualRecorder:
         """
         self.running = manifest
         self.newest_id = manifest.id
-        self._life.stopped_by_disk = False
+        self._lifecycle.stopped_by_disk = False
         try:
             shape = await asyncio.to_thread(self._prepared, manifest)
             output = Output(shape, self._writer.head, closed)
@@ -93,7 +93,7 @@ class ManualRecorder:
             await self.fail(error)
             return
         self._outputs.recording = output
-        self._life.move(Event.OPENED)
+        self._lifecycle.move(Event.OPENED)
         await self.keep(manifest.model_copy(update={"state": RecordingState.RECORDING}))
         _log.info("recording %s (%s)", manifest.id, manifest.preset)
 
@@ -107,7 +107,7 @@ class ManualRecorder:
         output = self._outputs.recording
         if self.running is None or output is None:
             return False
-        self._life.move(Event.STOP)
+        self._lifecycle.move(Event.STOP)
         await self._sources.caught_up()
         await self.keep(self.running.model_copy(update={"state": RecordingState.FINALISING}))
         return await asyncio.wrap_future(self._writer.remove(output))
@@ -127,7 +127,7 @@ class ManualRecorder:
             await self.fail(error)
             return
         self.running = None
-        self._life.close_well()
+        self._lifecycle.close_well()
         self._remember_rate(done)
         _log.info("%s has ended: %s, %d bytes", done.id, reason, done.size)
 
@@ -137,8 +137,8 @@ class ManualRecorder:
         self._outputs.recording = None
         full = is_full(error)
         what = "the disk is full" if full else f"the disk can't be written: {error.strerror}"
-        self._life.stopped_by_disk = full
-        self._life.fault(f"{what}; make room or check the disk, it is tried again by itself")
+        self._lifecycle.stopped_by_disk = full
+        self._lifecycle.fault(f"{what}; make room or check the disk, it is tried again by itself")
         if running is None:
             return
         now_ns = time.time_ns()
@@ -182,7 +182,7 @@ class ManualRecorder:
     def at_its_limit(self) -> bool:
         """Whether the recording has become as long or as large as was requested."""
         running, output = self.running, self._outputs.recording
-        if running is None or output is None or self._life.state is not State.RECORDING:
+        if running is None or output is None or self._lifecycle.state is not State.RECORDING:
             return False
         length_s = (time.monotonic_ns() - running.started_monotonic_ns) / _NS_PER_S
         size = running.size + output.progress.part_bytes

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Concatenate, Final, ParamSpec, TypeVar
 
 from common.errors import InvalidRequestError, NotFoundError, PreconditionError
 from common.reasons import Reason
+from recorder.assembly import Parts
 from recorder.lifecycle import Event, State
-from recorder.parts import Parts
-from recorder.readings import Readings
 from recorder.recorder import Recorder
 from recorder.requests import Result, SnapshotOptions, StartOptions
+from recorder.status_reader import StatusReader
 from recorder.store.folder import new_id
 from recorder.store.housekeeping import attempt
 from recorder.store.manifest import Copy, Kind, Manifest, RecordingState, StopReason
@@ -58,17 +58,17 @@ class Operations:
 
     Args:
         parts: of the recorder.
-        readings: of the same.
+        status_reader: of the same.
         recorder: runs them.
     """
 
-    def __init__(self, parts: Parts, readings: Readings, recorder: Recorder) -> None:
+    def __init__(self, parts: Parts, status_reader: StatusReader, recorder: Recorder) -> None:
         self._parts = parts
         self._settings = parts.settings
-        self._life = parts.life
+        self._lifecycle = parts.lifecycle
         self._manual = parts.manual
         self._ring = parts.ring
-        self._readings = readings
+        self._status_reader = status_reader
         self._recorder = recorder
 
     @_changing
@@ -86,10 +86,10 @@ class Operations:
         with_video = self._with_video(self._known(preset), options.with_video)
         self._check_can_start()
         await self._parts.housekeeping.need_room()
-        self._life.move(Event.START)
+        self._lifecycle.move(Event.START)
         await self._manual.open(self._begun(preset, with_video, options), self._parts.reports.closed)
         if self._manual.running is None:
-            raise PreconditionError(self._life.error, Reason.RECORDER_NOT_READY)
+            raise PreconditionError(self._lifecycle.error, Reason.RECORDER_NOT_READY)
         made = self._manual.running
         return await self._answer("StartRecording", request_id, f"recording {preset}, as {made.id}", made)
 
@@ -105,7 +105,7 @@ class Operations:
                 return await asyncio.shield(work)
         except TimeoutError:
             work.add_done_callback(_log_failure)
-            running = self._manual.running or self._readings.get(recording_id)
+            running = self._manual.running or self._status_reader.get(recording_id)
             return Result(f"{running.id} is still being finalised", running)
 
     @_changing
@@ -116,7 +116,7 @@ class Operations:
         running = self._manual.running
         if not recording_id and running is None:
             raise NotFoundError("no recording runs", Reason.RECORDING_NOT_FOUND)
-        manifest = self._readings.get(recording_id) if recording_id else running
+        manifest = self._status_reader.get(recording_id) if recording_id else running
         assert manifest is not None, "one of both"  # noqa: S101  # for the type checker
         snapshots = self._ring.due(manifest.id) if self._ring else []
         message = f"{manifest.id} had ended already"
@@ -126,7 +126,7 @@ class Operations:
         elif snapshots:
             await self._recorder.finish_snapshots(snapshots)
             message = f"{manifest.id} has ended"
-        return await self._answer("StopRecording", request_id, message, self._readings.get(manifest.id))
+        return await self._answer("StopRecording", request_id, message, self._status_reader.get(manifest.id))
 
     @_changing
     async def snapshot(self, request_id: str, options: SnapshotOptions, caller: str) -> Result:
@@ -168,7 +168,7 @@ class Operations:
         if earlier := self._earlier("PinRecording", request_id):
             return earlier
         await self._recorder.take_reports()
-        manifest = self._readings.get(recording_id).model_copy(update={"pinned": pinned})
+        manifest = self._status_reader.get(recording_id).model_copy(update={"pinned": pinned})
         await self._manual.keep(manifest)
         message = f"{recording_id} is pinned" if pinned else f"{recording_id} is no longer pinned"
         return await self._answer("PinRecording", request_id, message, manifest)
@@ -186,7 +186,7 @@ class Operations:
         if earlier := self._earlier("DeleteRecording", request_id):
             return earlier
         await self._recorder.take_reports()
-        manifest = self._readings.get(recording_id)
+        manifest = self._status_reader.get(recording_id)
         _check_deletable(manifest, expected_sha256, force=force)
         await asyncio.to_thread(self._parts.catalogue.delete, manifest)
         _log.info("deleted %s", recording_id)
@@ -210,7 +210,7 @@ class Operations:
             NotFoundError: there is no such recording.
         """
         await self._recorder.take_reports()
-        await self._manual.keep(self._readings.get(recording_id).model_copy(update={"copied": copy}))
+        await self._manual.keep(self._status_reader.get(recording_id).model_copy(update={"copied": copy}))
 
     # --- parts of operations ---
 
@@ -229,7 +229,7 @@ class Operations:
         state_file = self._parts.state_file
         state_file.remember(request_id, answer)
         await attempt("the answer is forgotten at the next start", state_file.write)
-        self._life.changes.notify_all()
+        self._lifecycle.changes.notify_all()
         return Result(message, recording)
 
     def _known(self, preset: str) -> str:
@@ -249,9 +249,10 @@ class Operations:
     def _check_can_start(self) -> None:
         if running := self._manual.running:
             raise PreconditionError(f"recording {running.id} runs; stop it first", Reason.RECORDING_RUNS)
-        if self._life.state is not State.IDLE:
+        if self._lifecycle.state is not State.IDLE:
             why = (
-                self._life.error or "recordings that were cut off are being recovered; try again in a moment"
+                self._lifecycle.error
+                or "recordings that were cut off are being recovered; try again in a moment"
             )
             raise PreconditionError(why, Reason.RECORDER_NOT_READY)
 

@@ -1,14 +1,14 @@
-"""The recorder's own life: recovers, records until it is stopped, keeps room, closes in order."""
+"""The recorder's own lifecycle: recovers, records until it is stopped, keeps room, closes in order."""
 
 import asyncio
 import logging
 import time
 from typing import Final, Literal
 
+from recorder.assembly import Parts
 from recorder.lifecycle import Event, State
-from recorder.parts import Parts
-from recorder.readings import Readings
 from recorder.reports import Failed, Finished
+from recorder.status_reader import StatusReader
 from recorder.store.housekeeping import LEAST_ROOM
 from recorder.store.manifest import Manifest, RecordingState, StopReason
 from recorder.store.room import is_full
@@ -27,16 +27,16 @@ class Recorder:
 
     Args:
         parts: of the recorder.
-        readings: of the same.
+        status_reader: of the same.
 
     Attributes:
         changing: held by whatever changes something.
     """
 
-    def __init__(self, parts: Parts, readings: Readings) -> None:
+    def __init__(self, parts: Parts, status_reader: StatusReader) -> None:
         self._parts = parts
-        self._readings = readings
-        self._life = parts.life
+        self._status_reader = status_reader
+        self._lifecycle = parts.lifecycle
         self._manual = parts.manual
         self._ring = parts.ring
         self._outputs = parts.outputs
@@ -106,14 +106,14 @@ class Recorder:
         try:
             goes_on = await self._load()
         except OSError as error:
-            self._life.fault(f"the folder of recordings can't be read or written: {error.strerror}")
+            self._lifecycle.fault(f"the folder of recordings can't be read or written: {error.strerror}")
             return
         self._loaded = True
         await self._parts.housekeeping.measure()
-        if self._life.state is State.RECOVERING:
-            self._life.move(Event.RECOVERED)
+        if self._lifecycle.state is State.RECOVERING:
+            self._lifecycle.move(Event.RECOVERED)
         else:
-            self._life.clear()
+            self._lifecycle.clear()
         if goes_on:
             # At once: no client may see an idle recorder between the two.
             await self._go_on(goes_on)
@@ -164,7 +164,7 @@ class Recorder:
             manifest = manifest.model_copy(update={"stop_reason": StopReason.INTERRUPTED})
             await self._manual.make_whole(manifest.model_copy(update={"state": RecordingState.RECOVERED}))
             return
-        self._life.move(Event.START)
+        self._lifecycle.move(Event.START)
         await self._manual.open(with_interruption(manifest, time.time_ns()), self._parts.reports.closed)
 
     async def _rest(self, ends: "asyncio.Task[Literal[True]]") -> None:
@@ -182,8 +182,8 @@ class Recorder:
         if not self._parts.writer.alive:
             raise RuntimeError("the writer has ended by a defect; see above")
         await self.take_reports()
-        if self._life.retry_due:
-            await (self._retry() if self._life.state is State.FAULTED else self._retry_ring())
+        if self._lifecycle.retry_due:
+            await (self._retry() if self._lifecycle.state is State.FAULTED else self._retry_ring())
         if self._manual.at_its_limit:
             await self.end(StopReason.LIMIT)
         if self._ring:
@@ -196,16 +196,16 @@ class Recorder:
 
     def _notify(self) -> None:
         """Wakes the watchers if there is something new, also from other threads and the sources."""
-        key = self._readings.change_key
+        key = self._status_reader.change_key
         if key != self._notified:
             self._notified = key
-            self._life.changes.notify_all()
+            self._lifecycle.changes.notify_all()
 
     async def _shut_down(self) -> None:
         await self.take_reports()
         if self._ring:
             await self.finish_snapshots(self._ring.due(all_of_them=True), StopReason.SHUTDOWN)
-        if self._life.state is State.RECORDING:
+        if self._lifecycle.state is State.RECORDING:
             await self.end(StopReason.SHUTDOWN)
         if self._ring:
             await self._ring.close()
@@ -223,12 +223,12 @@ class Recorder:
             await self._parts.housekeeping.make_room(LEAST_ROOM)
             await asyncio.to_thread(self._parts.reserve.take)
         except OSError as error:
-            self._life.fault(f"the disk can't be written: {error.strerror}; make room or check it")
+            self._lifecycle.fault(f"the disk can't be written: {error.strerror}; make room or check it")
             return
-        for manifest in self._readings.recordings:
+        for manifest in self._status_reader.recordings:
             if manifest.state is RecordingState.FAULTED and manifest.metadata is None:
                 await self._manual.make_whole(manifest)
-        self._life.clear()
+        self._lifecycle.clear()
         _log.info("the disk takes data again")
         await self._open_ring()
 
@@ -241,9 +241,9 @@ class Recorder:
             return
         if await housekeeping.make_room(need, recordings=self._outputs.recording is not None):
             return
-        if self._life.state is State.RECORDING:
+        if self._lifecycle.state is State.RECORDING:
             await self.end(StopReason.DISK)
-            self._life.stopped_for_room()
+            self._lifecycle.stopped_for_room()
         elif self._ring:
             await self.finish_snapshots(self._ring.due(all_of_them=True), StopReason.DISK)
 
@@ -254,7 +254,7 @@ class Recorder:
             await self._open_ring()
 
     async def _open_ring(self) -> None:
-        faulted = self._life.state in (State.FAULTED, State.RECOVERING)
+        faulted = self._lifecycle.state in (State.FAULTED, State.RECOVERING)
         if self._ring is None or self._outputs.ring or faulted:
             return
         try:
@@ -266,7 +266,7 @@ class Recorder:
         assert self._ring, "it has failed"  # noqa: S101  # for the type checker
         self._ring.fail(error)
         # A full disk is no fault: a recording that begins may delete older ones, which the ring may not.
-        if self._life.state is State.IDLE and not is_full(error):
-            self._life.fault(self._ring.problem)
+        if self._lifecycle.state is State.IDLE and not is_full(error):
+            self._lifecycle.fault(self._ring.problem)
         else:
-            self._life.try_later(self._ring.problem)
+            self._lifecycle.try_later(self._ring.problem)

@@ -8,9 +8,9 @@ import logging
 from typing import Final
 
 from bridge.config import GatewaySettings
+from bridge.jittered_backoff import JitteredBackoff
 from bridge.outbox.database import MOST_BYTES, MOST_ITEMS, MOST_PROBES
 from bridge.outbox.outbox import Outbox
-from bridge.pauses import Pauses
 from bridge.robot.feed import Feed, FeedError
 from bridge.robot.gateway import EVENTS_SILENT_S, events, explained
 from bridge.values import DropReason, Event, Item, OutboxError
@@ -41,10 +41,10 @@ class EventReader:
 
     async def run(self) -> None:
         """Reads; a failure of gateway or disk is tried again for as long as it takes."""
-        pauses = Pauses(_LONGEST_PAUSE_S)
+        backoff = JitteredBackoff(_LONGEST_PAUSE_S)
         while True:
             try:
-                await self._read(pauses)
+                await self._read(backoff)
             except OutboxError:
                 self._disk_failed = True
             except UserError as error:
@@ -53,9 +53,9 @@ class EventReader:
             except FeedError as error:
                 _log.error("no events from the gateway: %s", error)
             self.reconnects += 1
-            await pauses.wait()
+            await backoff.wait()
 
-    async def _read(self, pauses: Pauses) -> None:
+    async def _read(self, backoff: JitteredBackoff) -> None:
         position = await self._outbox.position()
         lost = await self._outbox.lost()
         feed = Feed(position, MOST_PROBES)
@@ -63,7 +63,7 @@ class EventReader:
             while True:
                 reason = self._reason(lost=lost)
                 items = await _next_items(responses, feed, reason)
-                pauses.reset()
+                backoff.reset()
                 if items and feed.position:
                     await self._outbox.append(items, feed.position)
                     lost = False

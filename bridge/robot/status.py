@@ -4,7 +4,7 @@ import logging
 from typing import Any, Final
 
 from bridge.config import GatewaySettings
-from bridge.pauses import Pauses
+from bridge.jittered_backoff import JitteredBackoff
 from bridge.robot.gateway import STATUS_SILENT_S, explained, statuses
 from common.broadcast import Broadcast
 from common.errors import UserError
@@ -42,20 +42,20 @@ class StatusReader:
 
     async def run(self) -> None:
         """Reads; tries again for as long as it takes."""
-        pauses = Pauses(_LONGEST_PAUSE_S)
+        backoff = JitteredBackoff(_LONGEST_PAUSE_S)
         while True:
             try:
                 async with statuses(self._settings) as responses:
                     while True:
                         self._take(await responses.read(STATUS_SILENT_S))
-                        pauses.reset()
+                        backoff.reset()
             except UserError as error:
                 line = explained(error)
-                if self.reachable or not pauses.failures or line != self.error:
+                if self.reachable or not backoff.failures or line != self.error:
                     _log.warning("no status from the gateway: %s", line)
                 self.reachable, self.error = False, line
                 self.changes.notify_all()
-            await pauses.wait()
+            await backoff.wait()
 
     def _take(self, response: Any) -> None:
         self.newest = response.status

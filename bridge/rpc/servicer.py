@@ -6,9 +6,9 @@ from typing import Any, Final
 
 import grpc
 
-from bridge.commands.desk import Desk, Pending
 from bridge.commands.judgement import Upload
-from bridge.status import Status
+from bridge.commands.pending_requests import Pending, PendingRequests
+from bridge.connection_status import Status
 from bridge.uploading import Uploading
 from bridge.values import OutboxError
 from common.errors import InvalidRequestError, TooMuchError
@@ -35,14 +35,14 @@ class BridgeServicer(pb_grpc.BridgeServiceServicer):
         run_id: of this run of the bridge.
         status: of the connection.
         uploads: the queue.
-        desk: requests of the hub.
+        requests: requests of the hub.
     """
 
-    def __init__(self, run_id: str, status: Status, uploads: Uploading, desk: Desk) -> None:
+    def __init__(self, run_id: str, status: Status, uploads: Uploading, requests: PendingRequests) -> None:
         self._run_id = run_id
         self._status = status
         self._uploads = uploads
-        self._desk = desk
+        self._requests = requests
 
     def register(self, server: grpc.aio.Server) -> None:
         """Adds the methods to a server."""
@@ -75,7 +75,7 @@ class BridgeServicer(pb_grpc.BridgeServiceServicer):
         if outcome is None:
             raise InvalidRequestError("outcome has to be DONE, REFUSED or FAILED")
         try:
-            await self._desk.answer(request.request_id, outcome, request.message, request.recording_id)
+            await self._requests.answer(request.request_id, outcome, request.message, request.recording_id)
         except OutboxError as error:
             raise TooMuchError(f"the answer can't be kept: {error}", Reason.DISK_FULL) from error
         return pb.AnswerRequestResponse()
@@ -85,7 +85,7 @@ class BridgeServicer(pb_grpc.BridgeServiceServicer):
             instance_id=self._run_id,
             status=self._status.message(),
             copies=self._uploads.copies(),
-            requests=[_request(each) for each in self._desk.pending],
+            requests=[_request(each) for each in self._requests.pending],
         )
 
 

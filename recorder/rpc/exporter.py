@@ -34,9 +34,9 @@ from common.reader_threads import ClosedError
 from common.reasons import Reason
 from common.tasks import first_to_end
 from omniseer.gateway.v1 import recording_pb2 as pb
-from recorder.readings import Readings
 from recorder.rpc import mapping
 from recorder.rpc.export_connections import ExportConnection, ExportConnections
+from recorder.status_reader import StatusReader
 from recorder.store.bundle_reader import BundleReader
 from recorder.store.export import Content, Export, export
 from recorder.store.readers import Readers
@@ -51,7 +51,7 @@ class Exporter:
     """Exports of recordings and run bundles.
 
     Args:
-        readings: of the recorder.
+        status_reader: of the recorder.
         bundles: the robot's own experiments.
         readers: threads that read.
         sums: of files.
@@ -61,7 +61,7 @@ class Exporter:
 
     def __init__(
         self,
-        readings: Readings,
+        status_reader: StatusReader,
         bundles: BundleReader,
         readers: Readers,
         sums: Sums,
@@ -69,7 +69,7 @@ class Exporter:
         connections: ExportConnections,
         max_bytes_per_s: int,
     ) -> None:
-        self._readings = readings
+        self._status_reader = status_reader
         self._bundles = bundles
         self._readers = readers
         self._sums = sums
@@ -138,7 +138,7 @@ class Exporter:
         """Closes the file when its recording is deleted while the block lasts."""
 
         async def close() -> None:
-            await self._readings.changes.wait_until(lambda: not self._readings.has(recording_id))
+            await self._status_reader.changes.wait_until(lambda: not self._status_reader.has(recording_id))
             exported.close()
 
         watch = None if bundle else asyncio.create_task(close(), name=f"deletion of {recording_id}")
@@ -151,7 +151,7 @@ class Exporter:
     def _failure(
         self, request: pb.ExportRecordingRequest, bundle: Bundle | None, error: Exception
     ) -> DomainError:
-        if bundle is None and not self._readings.has(request.recording_id):
+        if bundle is None and not self._status_reader.has(request.recording_id):
             return ConflictError(
                 f"recording {request.recording_id} was deleted meanwhile", Reason.RECORDING_DELETED
             )
@@ -160,12 +160,12 @@ class Exporter:
     async def _content(self, request: pb.ExportRecordingRequest, bundle: Bundle | None) -> Content:
         if bundle:
             return await self._bundle_content(bundle, request.file)
-        manifest = self._readings.get(request.recording_id)
+        manifest = self._status_reader.get(request.recording_id)
         for file in manifest.files:
             if file.name == request.file:
-                path = self._readings.folder_of(manifest) / file.name
+                path = self._status_reader.folder_of(manifest) / file.name
                 return Content(path, file.size, bytes.fromhex(file.sha256))
-        if request.file == self._readings.live(manifest).part:
+        if request.file == self._status_reader.live(manifest).part:
             raise _not_final(request.file)
         raise _no_such_file(manifest.id, request.file)
 

@@ -10,8 +10,8 @@ from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
 from recorder.config import RecorderSettings
 from recorder.lifecycle import State
-from recorder.readings import Readings
 from recorder.requests import Live
+from recorder.status_reader import StatusReader
 from recorder.store.manifest import Copy, CopyState, Kind, Manifest, RecordingState, StopReason
 from recorder.store.run_bundles import Bundle
 from recorder.values import Gap, GapCause
@@ -45,15 +45,15 @@ _COPY_STATES_BACK: Final = {message: state for state, message in COPY_STATES.ite
 _NS_PER_MS: Final = 1_000_000
 
 
-def recording(readings: Readings, manifest: Manifest, *, whole: bool = False) -> pb.Recording:
+def recording(status_reader: StatusReader, manifest: Manifest, *, whole: bool = False) -> pb.Recording:
     """Returns the message of a recording.
 
     Args:
-        readings: have how far it has come, if it runs.
+        status_reader: have how far it has come, if it runs.
         manifest: of the recording.
         whole: whether with its files and gaps.
     """
-    live = readings.live(manifest)
+    live = status_reader.live(manifest)
     gaps = manifest.all_gaps
     message = pb.Recording(
         id=manifest.id,
@@ -114,33 +114,33 @@ def bundle(found: Bundle, sums: Mapping[str, bytes] | None = None) -> pb.Recordi
     return message
 
 
-def status(readings: Readings, settings: RecorderSettings) -> pb.RecordingStatus:
+def status(status_reader: StatusReader, settings: RecorderSettings) -> pb.RecordingStatus:
     """Returns the message of the recorder's state."""
     message = pb.RecordingStatus(
-        state=STATES[readings.phase.state],
-        bytes_per_s=readings.bytes_per_s,
-        room_bytes=max(readings.room.bytes, 0),
-        ring_s=readings.ring_s,
-        snapshots_pending=readings.snapshots_pending,
-        last_error=readings.last_error,
+        state=STATES[status_reader.phase.state],
+        bytes_per_s=status_reader.bytes_per_s,
+        room_bytes=max(status_reader.room.bytes, 0),
+        ring_s=status_reader.ring_s,
+        snapshots_pending=status_reader.snapshots_pending,
+        last_error=status_reader.last_error,
         presets=[
             pb.RecordingPreset(
                 name=name,
                 description=preset.description,
                 with_video=preset.video and settings.video.socket is not None,
-                bytes_per_minute=readings.bytes_per_minute.get(name, 0),
+                bytes_per_minute=status_reader.bytes_per_minute.get(name, 0),
                 in_ring=name == settings.ring.preset,
             )
             for name, preset in settings.presets.items()
         ],
     )
-    recordings = readings.recordings
+    recordings = status_reader.recordings
     message.recordings = len(recordings)
     message.to_copy = sum(each.copied.outstanding for each in recordings)
-    if (room_s := readings.room_s) is not None:
+    if (room_s := status_reader.room_s) is not None:
         message.room_s = int(min(room_s, 1e9))
-    if running := readings.running:
-        live = readings.live(running)
+    if running := status_reader.running:
+        live = status_reader.live(running)
         message.recording_id = running.id
         message.label = running.label
         message.preset = running.preset
@@ -153,20 +153,20 @@ def status(readings: Readings, settings: RecorderSettings) -> pb.RecordingStatus
     return message
 
 
-def watch_state(readings: Readings, settings: RecorderSettings) -> recorder_pb.WatchStateResponse:
+def watch_state(status_reader: StatusReader, settings: RecorderSettings) -> recorder_pb.WatchStateResponse:
     """Returns the message that the gateway watches."""
-    newest = readings.newest
+    newest = status_reader.newest
     message = recorder_pb.WatchStateResponse(
-        instance_id=readings.run_id,
-        status=status(readings, settings),
-        newest=recording(readings, newest) if newest else None,
-        messages_dropped=readings.dropped,
-        disk_free_bytes=readings.room.disk.free_bytes,
-        disk_size_bytes=readings.room.disk.size_bytes,
-        disk_short=readings.disk_short,
-        ended=[recording(readings, each) for each in readings.recently_ended],
+        instance_id=status_reader.run_id,
+        status=status(status_reader, settings),
+        newest=recording(status_reader, newest) if newest else None,
+        messages_dropped=status_reader.dropped,
+        disk_free_bytes=status_reader.room.disk.free_bytes,
+        disk_size_bytes=status_reader.room.disk.size_bytes,
+        disk_short=status_reader.disk_short,
+        ended=[recording(status_reader, each) for each in status_reader.recently_ended],
     )
-    if (lost := readings.lost) is not None:
+    if (lost := status_reader.lost) is not None:
         message.messages_lost = lost
     return message
 

@@ -13,11 +13,11 @@ from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
 from omniseer.recorder.v1 import recorder_service_pb2_grpc as pb_grpc
 from recorder.config import RecorderSettings
 from recorder.operations import Operations
-from recorder.readings import Readings
 from recorder.requests import Result, SnapshotOptions, StartOptions
 from recorder.rpc import mapping
 from recorder.rpc.export_connections import ExportConnections
 from recorder.rpc.exporter import Exporter, metadata
+from recorder.status_reader import StatusReader
 from recorder.store.bundle_reader import BundleReader
 from recorder.store.manifest import Manifest
 from recorder.store.readers import Readers
@@ -40,7 +40,7 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
 
     Args:
         operations: of the recorder.
-        readings: of the same.
+        status_reader: of the same.
         settings: of the program.
         readers: threads that read the disk for callers.
         connections: hand files of exports over to a gateway that connects there; None: gRPC carries all.
@@ -49,19 +49,19 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
     def __init__(
         self,
         operations: Operations,
-        readings: Readings,
+        status_reader: StatusReader,
         settings: RecorderSettings,
         readers: Readers,
         connections: ExportConnections | None = None,
     ) -> None:
         sums = Sums(readers.files)
         self._operations = operations
-        self._readings = readings
+        self._status_reader = status_reader
         self._settings = settings
         self._readers = readers
         self._bundles = BundleReader(RunBundles(settings.run_bundles), readers.looks, sums)
         self._exporter = Exporter(
-            readings,
+            status_reader,
             self._bundles,
             readers,
             sums,
@@ -81,8 +81,8 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         self, _request: recorder_pb.WatchStateRequest, _context: grpc.aio.ServicerContext[Any, Any]
     ) -> AsyncIterator[recorder_pb.WatchStateResponse]:
         """Streams the state, now and on every change; a slow reader skips outdated states."""
-        async for _ in self._readings.changes.now_and_on_change(self._heartbeat_s):
-            yield mapping.watch_state(self._readings, self._settings)
+        async for _ in self._status_reader.changes.now_and_on_change(self._heartbeat_s):
+            yield mapping.watch_state(self._status_reader, self._settings)
 
     async def StartRecording(  # noqa: N802  # the schema names it
         self, request: pb.StartRecordingRequest, _context: grpc.aio.ServicerContext[Any, Any]
@@ -123,7 +123,7 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         self, request: pb.ListRecordingsRequest, _context: grpc.aio.ServicerContext[Any, Any]
     ) -> pb.ListRecordingsResponse:
         """Returns a page of the list."""
-        listed: list[Manifest | Bundle] = [*self._readings.recordings, *await self._bundles.all()]
+        listed: list[Manifest | Bundle] = [*self._status_reader.recordings, *await self._bundles.all()]
         listed.sort(key=_place, reverse=True)
         if request.page_token:
             listed = _after(listed, request.page_token)
@@ -132,7 +132,7 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         return pb.ListRecordingsResponse(
             recordings=[self._message(each) for each in page],
             next_page_token=_token(page[-1]) if len(listed) > size else "",
-            status=mapping.status(self._readings, self._settings),
+            status=mapping.status(self._status_reader, self._settings),
         )
 
     async def GetRecording(  # noqa: N802  # the schema names it
@@ -141,8 +141,8 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         """Returns a recording with its files."""
         if bundle := await self._bundle(request.recording_id):
             return pb.GetRecordingResponse(recording=mapping.bundle(bundle, await self._bundles.sums(bundle)))
-        manifest = self._readings.get(request.recording_id)
-        return pb.GetRecordingResponse(recording=mapping.recording(self._readings, manifest, whole=True))
+        manifest = self._status_reader.get(request.recording_id)
+        return pb.GetRecordingResponse(recording=mapping.recording(self._status_reader, manifest, whole=True))
 
     async def ExportRecording(  # noqa: N802  # the schema names it
         self, request: pb.ExportRecordingRequest, context: grpc.aio.ServicerContext[Any, Any]
@@ -157,8 +157,8 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         self, request: pb.GetRecordingThumbnailRequest, _context: grpc.aio.ServicerContext[Any, Any]
     ) -> pb.GetRecordingThumbnailResponse:
         """Returns a key frame."""
-        manifest = self._readings.get(request.recording_id)
-        folder = self._readings.folder_of(manifest)
+        manifest = self._status_reader.get(request.recording_id)
+        folder = self._status_reader.folder_of(manifest)
         found = await self._readers.looks.run(find_thumbnail, folder, manifest)
         if found is None:
             raise NotFoundError(
@@ -202,16 +202,18 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         return recorder_pb.SetCopyResponse()
 
     def _heartbeat_s(self) -> float:
-        return _HEARTBEAT_WRITING_S if self._readings.writes else _HEARTBEAT_S
+        return _HEARTBEAT_WRITING_S if self._status_reader.writes else _HEARTBEAT_S
 
     def _recording_of(self, result: Result) -> pb.Recording | None:
-        return mapping.recording(self._readings, result.recording) if result.recording else None
+        return mapping.recording(self._status_reader, result.recording) if result.recording else None
 
     def _message(self, each: Manifest | Bundle) -> pb.Recording:
-        return mapping.bundle(each) if isinstance(each, Bundle) else mapping.recording(self._readings, each)
+        return (
+            mapping.bundle(each) if isinstance(each, Bundle) else mapping.recording(self._status_reader, each)
+        )
 
     async def _bundle(self, recording_id: str) -> Bundle | None:
-        return None if self._readings.has(recording_id) else await self._bundles.get(recording_id)
+        return None if self._status_reader.has(recording_id) else await self._bundles.get(recording_id)
 
     async def _refuse_bundle(self, recording_id: str) -> None:
         if await self._bundle(recording_id):

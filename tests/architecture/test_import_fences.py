@@ -126,19 +126,19 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         *(
             (f"recorder/{name}.py", (*HEAVY, *WIRE, "omniseer", "recorder.intake", "recorder.rpc"))
             for name in (
-                "life",
+                "lifecycle_runner",
                 "manual_recorder",
                 "operations",
                 "outputs",
-                "parts",
-                "readings",
+                "assembly",
+                "status_reader",
                 "recorder",
                 "reports",
                 "ring_recorder",
             )
         ),
-        ("recorder/manual_recorder.py", ("recorder.parts", "recorder.recorder", "recorder.ring_recorder")),
-        ("recorder/readings.py", ("recorder.recorder", "recorder.operations")),
+        ("recorder/manual_recorder.py", ("recorder.assembly", "recorder.recorder", "recorder.ring_recorder")),
+        ("recorder/status_reader.py", ("recorder.recorder", "recorder.operations")),
         ("gateway/status/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config", "asyncio")),
         ("gateway/access/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config")),
         ("gateway/ros/", ("gateway.rpc", "gateway.links", *WIRE)),
@@ -222,10 +222,10 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("console/window/", ("console.cli",)),
         *(
             (f"bridge/{name}.py", (*HEAVY, *WIRE, "omniseer", "asyncio", "time", "fleet"))
-            for name in ("values", "lifecycle", "commands/ages")
+            for name in ("values", "lifecycle", "commands/hub_time")
         ),
         ("bridge/robot/feed.py", ("grpc", "asyncio", "time", "fleet", "bridge.outbox")),
-        ("bridge/state.py", ("grpc", "asyncio", "time", "fleet", "bridge.outbox")),
+        ("bridge/robot_state.py", ("grpc", "asyncio", "time", "fleet", "bridge.outbox")),
         ("bridge/outbox/", (*HEAVY, *WIRE, "omniseer", "fleet", "bridge.robot", "bridge.commands")),
         ("bridge/commands/judgement.py", ("grpc", "asyncio", "time", "fleet.connection", "bridge.outbox")),
     ],

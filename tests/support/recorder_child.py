@@ -20,9 +20,9 @@ _PERIOD_S: Final = 0.002
 async def main(root: Path, first: int) -> None:
     """Records until the process is killed."""
     async with running_recorder(root, segments={"max_s": 1}) as running:
-        if running.readings.running is None:
+        if running.status_reader.running is None:
             await running.operations.start("child", StartOptions())
-        await running.until(lambda: running.readings.phase.state is State.RECORDING)
+        await running.until(lambda: running.status_reader.phase.state is State.RECORDING)
         source = Source(running.queue, sent=first - 1)
         while True:
             source.send(size=1000)

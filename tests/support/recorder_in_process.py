@@ -9,13 +9,13 @@ from pathlib import Path
 from random import randbytes
 from typing import Any, Final
 
+from recorder.assembly import build
 from recorder.config import RecorderSettings
 from recorder.lifecycle import State
 from recorder.mcap.reading import messages
 from recorder.operations import Operations
-from recorder.parts import parts_of
-from recorder.readings import Readings
 from recorder.recorder import Recorder
+from recorder.status_reader import StatusReader
 from recorder.store.folder import make_directory
 from recorder.store.manifest import Manifest
 from recorder.values import Channel, Sample
@@ -48,9 +48,9 @@ class Source:
             self.queue.put([Sample(self.of, data, now_ns, now_ns, self.sent, time.monotonic_ns())])
 
 
-def numbers(readings: Readings, manifest: Manifest, topic: str = "/odom") -> list[int]:
+def numbers(status_reader: StatusReader, manifest: Manifest, topic: str = "/odom") -> list[int]:
     """What the messages of a `Source` say that a recording has, in order."""
-    folder = readings.folder_of(manifest)
+    folder = status_reader.folder_of(manifest)
     return [
         int(data[8:].partition(b".")[0])
         for segment in manifest.segments
@@ -91,7 +91,7 @@ class LatchedMessages:
 @dataclass
 class Running:
     operations: Operations
-    readings: Readings
+    status_reader: StatusReader
     queue: SampleQueue
     sources: NoSources
     settings: RecorderSettings
@@ -100,8 +100,8 @@ class Running:
         """Returns when so many messages of the running recording are on the disk."""
         await self.until(
             lambda: (
-                self.readings.running is not None
-                and self.readings.live(self.readings.running).messages >= count
+                self.status_reader.running is not None
+                and self.status_reader.live(self.status_reader.running).messages >= count
             )
         )
 
@@ -125,14 +125,14 @@ async def running_recorder(root: Path, boot_id: str = "boot", **values: Any) -> 
     settings = settings_for(root, **values)
     make_directory(root)
     queue, sources = SampleQueue(settings.queue_bytes), NoSources()
-    parts = parts_of(settings, queue, sources, LatchedMessages(), boot_id=boot_id, run_id="run")
-    readings = Readings(parts)
-    recorder = Recorder(parts, readings)
+    parts = build(settings, queue, sources, LatchedMessages(), boot_id=boot_id, run_id="run")
+    status_reader = StatusReader(parts)
+    recorder = Recorder(parts, status_reader)
     stop = asyncio.Event()
     task = asyncio.ensure_future(recorder.run(stop))
-    running = Running(Operations(parts, readings, recorder), readings, queue, sources, settings)
+    running = Running(Operations(parts, status_reader, recorder), status_reader, queue, sources, settings)
     try:
-        await running.until(lambda: task.done() or readings.phase.state is not State.RECOVERING)
+        await running.until(lambda: task.done() or status_reader.phase.state is not State.RECOVERING)
         yield running
     finally:
         stop.set()

@@ -44,7 +44,7 @@ async def served(root: Path, **values: Any) -> AsyncIterator[Served]:
             server = rpc.new_server()
             connections = ExportConnections()
             servicer = RecorderServicer(
-                running.operations, running.readings, running.settings, readers, connections
+                running.operations, running.status_reader, running.settings, readers, connections
             )
             servicer.register(server)
             socket = root / "recorder.sock"

@@ -21,7 +21,7 @@ async def woken(running: Running, change: Callable[[], object] | None = None) ->
             change()
         return changed > 0
 
-    return await running.readings.changes.wait_until(count, IDLE_S)
+    return await running.status_reader.changes.wait_until(count, IDLE_S)
 
 
 async def falls_silent(running: Running) -> bool:
@@ -44,6 +44,6 @@ async def test_an_idle_recorder_notifies_no_one(tmp_path: Path) -> None:
 
 async def test_a_ring_without_messages_notifies_no_one_and_with_them_it_does(tmp_path: Path) -> None:
     async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
-        await running.until(lambda: running.readings.writes)
+        await running.until(lambda: running.status_reader.writes)
         assert await falls_silent(running)
         assert await woken(running, Source(running.queue).send)

@@ -29,7 +29,7 @@ async def test_a_message_with_a_time_that_is_none_is_recorded(tmp_path: Path, pu
         running.queue.put([Sample(channel(), data, now_ns, published_ns, 1, time.monotonic_ns())])
         done = (await running.operations.stop("2", "")).recording
         assert done
-        segment = running.readings.folder_of(done) / done.segments[0].name
+        segment = running.status_reader.folder_of(done) / done.segments[0].name
         assert list(messages(segment, "/odom")) == [(now_ns, data)]
 
 
@@ -99,7 +99,7 @@ async def test_a_caller_that_leaves_a_start_leaves_no_half_recording(
             with pytest.raises(asyncio.CancelledError):
                 await call
             released.set()
-            await running.until(lambda: running.readings.phase.state is State.RECORDING)
+            await running.until(lambda: running.status_reader.phase.state is State.RECORDING)
         Source(running.queue).send(10)
         repeated = (await running.operations.start("1", StartOptions())).recording
         done = (await running.operations.stop("2", "")).recording

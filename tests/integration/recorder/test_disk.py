@@ -62,7 +62,7 @@ async def test_a_disk_full_before_the_start_refuses_it(small_disk: Path) -> None
         fill(small_disk, 2 * MIB)
         with pytest.raises(TooMuchError, match="no room"):
             await running.operations.start("1", StartOptions())
-        assert running.readings.phase.state is State.IDLE
+        assert running.status_reader.phase.state is State.IDLE
 
 
 async def test_a_disk_that_fills_up_ends_the_recording_and_keeps_what_was_written(small_disk: Path) -> None:
@@ -73,17 +73,17 @@ async def test_a_disk_that_fills_up_ends_the_recording_and_keeps_what_was_writte
         await running.written(100)
         ballast = fill(small_disk, 100_000)
         source.send(100, size=20_000)
-        await running.until(lambda: running.readings.running is None)
-        cut = running.readings.newest
+        await running.until(lambda: running.status_reader.running is None)
+        cut = running.status_reader.newest
         assert cut
         assert cut.stop_reason is StopReason.DISK
         assert cut.messages >= 100
-        assert running.readings.disk_short
-        assert "disk" in running.readings.last_error
+        assert running.status_reader.disk_short
+        assert "disk" in running.status_reader.last_error
         # With room again it records again, by itself.
         ballast.unlink()
-        await running.until(lambda: running.readings.phase.state is State.IDLE)
-        await running.until(lambda: not running.readings.get(cut.id).state.open)
+        await running.until(lambda: running.status_reader.phase.state is State.IDLE)
+        await running.until(lambda: not running.status_reader.get(cut.id).state.open)
         assert (await running.operations.start("2", StartOptions())).recording
 
 
@@ -92,14 +92,14 @@ async def test_a_disk_full_at_the_end_leaves_a_recording_that_opens(small_disk: 
         await running.operations.start("1", StartOptions())
         Source(running.queue).send(50, size=1000)
         await running.written(50)
-        recording = running.readings.running
+        recording = running.status_reader.running
         assert recording
         ballast = fill(small_disk, 0)
         with suppress(NotFoundError):  # The writer may find the disk full before the stop comes.
             await running.operations.stop("2", "")
         ballast.unlink()
-        await running.until(lambda: running.readings.phase.state is State.IDLE)
-        done = running.readings.get(recording.id)
+        await running.until(lambda: running.status_reader.phase.state is State.IDLE)
+        done = running.status_reader.get(recording.id)
         assert done.state in (RecordingState.COMPLETE, RecordingState.FAULTED)
         assert done.messages == 50
         assert done.metadata
@@ -124,17 +124,17 @@ async def test_an_error_of_the_disk_ends_the_recording_and_it_records_again_by_i
         await running.written(100)
         with files_of_at_most(400_000):
             source.send(100, size=20_000)
-            await running.until(lambda: running.readings.running is None)
-            cut = running.readings.newest
+            await running.until(lambda: running.status_reader.running is None)
+            cut = running.status_reader.newest
             assert cut
             assert (cut.state, cut.stop_reason) == (RecordingState.FAULTED, StopReason.ERROR)
-            assert "the disk can't be written: File too large" in running.readings.last_error
-            assert not running.readings.disk_short
+            assert "the disk can't be written: File too large" in running.status_reader.last_error
+            assert not running.status_reader.disk_short
             with pytest.raises(PreconditionError, match="can't be written"):
                 await running.operations.start("2", StartOptions())
-        await running.until(lambda: running.readings.phase.state is State.IDLE)
-        assert running.readings.last_error == ""
-        found = numbers(running.readings, running.readings.get(cut.id))
+        await running.until(lambda: running.status_reader.phase.state is State.IDLE)
+        assert running.status_reader.last_error == ""
+        found = numbers(running.status_reader, running.status_reader.get(cut.id))
         assert found == list(range(1, len(found) + 1))
         assert len(found) >= 100
         assert (await running.operations.start("3", StartOptions())).recording
@@ -149,8 +149,8 @@ async def test_the_gap_of_a_failed_disk_covers_what_was_buffered(tmp_path: Path)
         with files_of_at_most(200_000):
             handed_ns = time.time_ns()
             source.send(100, size=20_000)
-            await running.until(lambda: running.readings.running is None)
-        cut = running.readings.newest
+            await running.until(lambda: running.status_reader.running is None)
+        cut = running.status_reader.newest
         assert cut
         (gap,) = [each for each in cut.gaps if each.cause is GapCause.DISK]
         assert gap.began_ns <= handed_ns < gap.ended_ns
@@ -158,7 +158,7 @@ async def test_the_gap_of_a_failed_disk_covers_what_was_buffered(tmp_path: Path)
 
 async def test_a_snapshot_tells_when_the_ring_could_not_be_written(tmp_path: Path) -> None:
     async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
-        await running.until(lambda: running.readings.writes)
+        await running.until(lambda: running.status_reader.writes)
         source = Source(running.queue)
         source.send(10)
         made = await running.operations.snapshot("1", SnapshotOptions(pre_s=10, post_s=3), "someone")
@@ -166,9 +166,9 @@ async def test_a_snapshot_tells_when_the_ring_could_not_be_written(tmp_path: Pat
         with files_of_at_most(100_000):
             handed_ns = time.time_ns()
             source.send(100, size=20_000)
-            await running.until(lambda: "the ring can't be written" in running.readings.last_error)
-        await running.until(lambda: not running.readings.snapshots_pending)
-        found = running.readings.get(made.recording.id)
+            await running.until(lambda: "the ring can't be written" in running.status_reader.last_error)
+        await running.until(lambda: not running.status_reader.snapshots_pending)
+        found = running.status_reader.get(made.recording.id)
         (gap,) = [each for each in found.gaps if each.cause is GapCause.DISK]
         assert gap.began_ns <= handed_ns < gap.ended_ns
 
@@ -176,16 +176,16 @@ async def test_a_snapshot_tells_when_the_ring_could_not_be_written(tmp_path: Pat
 async def test_a_snapshot_over_a_restart_tells_of_it(tmp_path: Path) -> None:
     ring = {"preset": "all"}
     async with running_recorder(tmp_path, ring=ring) as running:
-        await running.until(lambda: running.readings.writes)
+        await running.until(lambda: running.status_reader.writes)
         Source(running.queue).send(10)
     async with running_recorder(tmp_path, ring=ring) as running:
-        await running.until(lambda: running.readings.writes)
+        await running.until(lambda: running.status_reader.writes)
         Source(running.queue, sent=10).send(10)
         made = await running.operations.snapshot("1", SnapshotOptions(pre_s=60, post_s=0), "someone")
-        await running.until(lambda: not running.readings.snapshots_pending)
+        await running.until(lambda: not running.status_reader.snapshots_pending)
         assert made.recording
-        found = running.readings.get(made.recording.id)
-        assert numbers(running.readings, found) == list(range(1, 21))
+        found = running.status_reader.get(made.recording.id)
+        assert numbers(running.status_reader, found) == list(range(1, 21))
         (gap,) = found.gaps
         first, second = (each for each in found.segments if each.messages)
         assert gap == Gap("", GapCause.INTERRUPTED, first.last_ns or 0, second.first_ns or 0, None)
@@ -199,7 +199,7 @@ async def test_a_snapshot_that_was_cut_off_lacks_the_rest_of_its_window(tmp_path
     cut = {"state": RecordingState.RECORDING, "kind": Kind.SNAPSHOT, "window_ns": (0, until_ns)}
     done.model_copy(update=cut).write(tmp_path / "recordings" / done.id)
     async with running_recorder(tmp_path) as running:
-        found = running.readings.get(done.id)
+        found = running.status_reader.get(done.id)
         assert found.gaps == (Gap("", GapCause.INTERRUPTED, last_ns, until_ns, None),)
 
 
@@ -218,10 +218,12 @@ async def test_any_file_that_a_power_cut_has_taken_costs_no_other_recording(
         shutil.copytree(whole, root)
         harm(root / file)
         async with running_recorder(root, ring={"preset": "all"}) as running:
-            assert running.readings.phase.state is State.IDLE, file
-            assert numbers(running.readings, running.readings.get(intact.id)) == list(range(1, 11)), file
-            if running.readings.has(hurt.id) and file.suffix != ".mcap":
-                assert running.readings.get(hurt.id).messages == 10, file
+            assert running.status_reader.phase.state is State.IDLE, file
+            assert numbers(running.status_reader, running.status_reader.get(intact.id)) == list(
+                range(1, 11)
+            ), file
+            if running.status_reader.has(hurt.id) and file.suffix != ".mcap":
+                assert running.status_reader.get(hurt.id).messages == 10, file
             await running.operations.start("again", StartOptions())
 
 
@@ -237,14 +239,14 @@ async def test_room_is_made_in_the_order_of_retention(small_disk: Path) -> None:
         await running.operations.pin("pin", pinned.id, pinned=True)
         ballast = fill(small_disk, 11 * MIB + MIB // 2)
         await running.operations.start("a", StartOptions())
-        assert not running.readings.has(copied.id)
-        assert running.readings.has(oldest.id)
+        assert not running.status_reader.has(copied.id)
+        assert running.status_reader.has(oldest.id)
         await running.operations.stop("b", "")
         ballast.unlink()
         fill(small_disk, 6 * MIB)
         with pytest.raises(TooMuchError):
             await running.operations.start("c", StartOptions())
-        assert {each.id for each in running.readings.recordings} == {pinned.id, waiting.id}
+        assert {each.id for each in running.status_reader.recordings} == {pinned.id, waiting.id}
 
 
 async def test_a_damaged_manifest_is_made_anew_and_kept_aside(tmp_path: Path) -> None:
@@ -253,7 +255,7 @@ async def test_a_damaged_manifest_is_made_anew_and_kept_aside(tmp_path: Path) ->
     folder = tmp_path / "recordings" / done.id
     (folder / "manifest.json").write_text('{"id": 7', encoding="utf-8")
     async with running_recorder(tmp_path) as running:
-        found = running.readings.get(done.id)
+        found = running.status_reader.get(done.id)
         assert found.messages == 10
         assert found.state is RecordingState.RECOVERED
         assert found.pinned  # It might have been.
@@ -276,7 +278,7 @@ async def test_what_is_not_ours_is_neither_listed_nor_deleted(tmp_path: Path) ->
         path.write_text("mine", encoding="utf-8")
     (recordings / "20260101T000000Z-aaaaaa").symlink_to(tmp_path / "elsewhere")
     async with running_recorder(tmp_path) as running:
-        assert [each.id for each in running.readings.recordings] == [done.id]
+        assert [each.id for each in running.status_reader.recordings] == [done.id]
         await running.operations.delete("1", done.id, b"", force=False)
     assert all(path.read_text(encoding="utf-8") == "mine" for path in strange)
     assert [path.name for path in (recordings / done.id / "data").iterdir()] == ["my-notes.txt"]
@@ -311,8 +313,8 @@ async def test_a_recording_cut_off_in_this_boot_goes_on_and_in_an_earlier_one_en
 
     monkeypatch.setattr("os.statvfs", slowly)
     async with running_recorder(tmp_path) as running:
-        assert running.readings.running
-        assert running.readings.running.id == done.id
+        assert running.status_reader.running
+        assert running.status_reader.running.id == done.id
         with pytest.raises(PreconditionError):
             await running.operations.start("3", StartOptions())
     ended = Manifest.model_validate_json((folder / "manifest.json").read_bytes())
@@ -320,8 +322,8 @@ async def test_a_recording_cut_off_in_this_boot_goes_on_and_in_an_earlier_one_en
     assert [gap.cause.name for gap in ended.gaps] == ["INTERRUPTED"]
     cut.write(folder)
     async with running_recorder(tmp_path, boot_id="another") as running:
-        assert running.readings.running is None
-        found = running.readings.get(done.id)
+        assert running.status_reader.running is None
+        found = running.status_reader.get(done.id)
         assert (found.state, found.stop_reason) == (RecordingState.RECOVERED, StopReason.INTERRUPTED)
 
 
@@ -333,10 +335,10 @@ async def test_a_snapshot_cut_off_in_this_boot_does_not_grow_afterwards(tmp_path
     times = {"started_monotonic_ns": an_hour_ago_ns, "ended_monotonic_ns": 0, "ended_unix_ms": 0}
     done.model_copy(update=cut | times).write(tmp_path / "recordings" / done.id)
     async with running_recorder(tmp_path) as running:
-        found = running.readings.get(done.id)
+        found = running.status_reader.get(done.id)
         assert found.state is RecordingState.RECOVERED
         calendar_ms = found.ended_unix_ms - found.started_unix_ms
-        assert running.readings.live(found).duration_ms == max(calendar_ms, 0)
+        assert running.status_reader.live(found).duration_ms == max(calendar_ms, 0)
 
 
 async def test_a_recording_can_be_deleted_on_a_disk_without_a_free_byte(small_disk: Path) -> None:
@@ -344,8 +346,8 @@ async def test_a_recording_can_be_deleted_on_a_disk_without_a_free_byte(small_di
         done = await recorded(running, MIB)
         fill(small_disk, 0)
         await running.operations.delete("1", done.id, done.sha256, force=False)
-        assert running.readings.recordings == []
-        assert not running.readings.folder_of(done).exists()
+        assert running.status_reader.recordings == []
+        assert not running.status_reader.folder_of(done).exists()
 
 
 async def test_a_start_on_a_full_disk_makes_whole_what_was_cut_off_and_then_room(
@@ -355,12 +357,12 @@ async def test_a_start_on_a_full_disk_makes_whole_what_was_cut_off_and_then_room
     old, cut = await cut_off(root)
     fill(small_disk, 0)
     async with running_recorder(root, boot_id="another") as running:
-        await running.until(lambda: running.readings.phase.state is State.IDLE)
-        found = running.readings.get(cut.id)
+        await running.until(lambda: running.status_reader.phase.state is State.IDLE)
+        found = running.status_reader.get(cut.id)
         assert (found.state, found.messages) == (RecordingState.RECOVERED, 10)
-        assert running.readings.has(old.id), "what is cut off fits into the reserve"
+        assert running.status_reader.has(old.id), "what is cut off fits into the reserve"
         assert (await running.operations.start("again", StartOptions())).recording
-        assert not running.readings.has(old.id)
+        assert not running.status_reader.has(old.id)
 
 
 async def test_a_start_on_a_full_disk_without_a_reserve_deletes_as_ever(small_disk: Path) -> None:
@@ -369,9 +371,9 @@ async def test_a_start_on_a_full_disk_without_a_reserve_deletes_as_ever(small_di
     (root / "reserve").unlink()
     fill(small_disk, 0)
     async with running_recorder(root, boot_id="another") as running:
-        await running.until(lambda: running.readings.phase.state is State.IDLE)
-        assert running.readings.get(cut.id).state is RecordingState.RECOVERED
-        assert not running.readings.has(old.id)
+        await running.until(lambda: running.status_reader.phase.state is State.IDLE)
+        assert running.status_reader.get(cut.id).state is RecordingState.RECOVERED
+        assert not running.status_reader.has(old.id)
 
 
 @pytest.mark.parametrize("deleted", [0, 1, 2])
@@ -392,8 +394,8 @@ async def test_a_deletion_that_was_cut_off_is_gone_on_with(
             with pytest.raises(OSError, match="as if"):
                 await running.operations.delete("1", done.id, b"", force=False)
     async with running_recorder(tmp_path) as running:
-        assert running.readings.recordings == []
-        assert not running.readings.folder_of(done).exists()
+        assert running.status_reader.recordings == []
+        assert not running.status_reader.folder_of(done).exists()
 
 
 async def cut_off(root: Path) -> tuple[Manifest, Manifest]:
@@ -403,9 +405,9 @@ async def cut_off(root: Path) -> tuple[Manifest, Manifest]:
         await running.operations.start("cut", StartOptions())
         Source(running.queue).send(10)
         await running.written(10)
-        cut = running.readings.running
+        cut = running.status_reader.running
         assert cut
-        (part,) = (running.readings.folder_of(cut) / "data").glob("*.part")
+        (part,) = (running.status_reader.folder_of(cut) / "data").glob("*.part")
         content = part.read_bytes()
     for file in part.parent.iterdir():
         file.unlink()
@@ -425,13 +427,13 @@ async def test_a_file_that_the_disk_refuses_costs_no_other_recording(
     with monkeypatch.context() as patched:
         patched.setattr("recorder.store.salvage.recover", broken)
         async with running_recorder(tmp_path, boot_id="another") as running:
-            assert running.readings.phase.state is State.IDLE
-            found = running.readings.get(cut.id)
+            assert running.status_reader.phase.state is State.IDLE
+            found = running.status_reader.get(cut.id)
             assert (found.state, found.messages) == (RecordingState.RECOVERED, 0)
             assert GapCause.DISK in {gap.cause for gap in found.gaps}
             assert (await recorded(running, 3000)).messages == 10
     async with running_recorder(tmp_path, boot_id="another") as running:
-        assert running.readings.get(cut.id).messages == 10, "the disk reads it again"
+        assert running.status_reader.get(cut.id).messages == 10, "the disk reads it again"
 
 
 async def test_a_recording_that_the_disk_refuses_to_complete_is_set_aside(
@@ -447,13 +449,13 @@ async def test_a_recording_that_the_disk_refuses_to_complete_is_set_aside(
     monkeypatch.setattr("recorder.store.salvage.replace_file", forbidden)
     monkeypatch.setattr("recorder.store.manifest.replace_file", forbidden)
     async with running_recorder(tmp_path, boot_id="another") as running:
-        assert running.readings.phase.state is State.IDLE
-        assert running.readings.get(cut.id).state is RecordingState.FAULTED
-        assert f"recording {cut.id} can't be completed: Permission denied" in running.readings.last_error
-        assert running.readings.get(old.id).state is RecordingState.COMPLETE
+        assert running.status_reader.phase.state is State.IDLE
+        assert running.status_reader.get(cut.id).state is RecordingState.FAULTED
+        assert f"recording {cut.id} can't be completed: Permission denied" in running.status_reader.last_error
+        assert running.status_reader.get(old.id).state is RecordingState.COMPLETE
         assert (await recorded(running, 3000)).messages == 10
         await running.operations.delete("1", cut.id, b"", force=False)
-        assert running.readings.last_error == ""
+        assert running.status_reader.last_error == ""
 
 
 async def test_an_unfinished_file_whose_final_name_is_taken_is_kept_aside(tmp_path: Path) -> None:
@@ -463,8 +465,8 @@ async def test_an_unfinished_file_whose_final_name_is_taken_is_kept_aside(tmp_pa
     shutil.copy(data / "000000.mcap", data / "000000.mcap.part")
     (data / "000000.mcap.damaged").write_text("an earlier one", encoding="utf-8")
     async with running_recorder(tmp_path) as running:
-        assert running.readings.phase.state is State.IDLE
-        found = running.readings.get(done.id)
+        assert running.status_reader.phase.state is State.IDLE
+        found = running.status_reader.get(done.id)
         assert (found.messages, found.segments) == (10, done.segments)
         assert GapCause.DISK in {gap.cause for gap in found.gaps}
         assert (data / "000000.mcap.damaged").read_text(encoding="utf-8") == "an earlier one"
@@ -479,7 +481,7 @@ async def test_the_number_of_a_damaged_file_is_not_used_again(tmp_path: Path) ->
     (data / "000000.mcap").write_bytes(b"damaged")
     (data / "000000.mcap.part").unlink()
     async with running_recorder(tmp_path) as running:
-        await running.until(lambda: running.readings.phase.state is State.RECORDING)
+        await running.until(lambda: running.status_reader.phase.state is State.RECORDING)
         Source(running.queue).send(10)
         done = (await running.operations.stop("stop", "")).recording
         assert done
@@ -496,32 +498,32 @@ async def test_the_ring_alone_deletes_no_recording_for_what_others_have_written(
         assert made.recording
         ballast = fill(small_disk, 6 * MIB)
         # It ends with what it has.
-        await running.until(lambda: not running.readings.snapshots_pending)
-        snapshot = running.readings.get(made.recording.id)
+        await running.until(lambda: not running.status_reader.snapshots_pending)
+        snapshot = running.status_reader.get(made.recording.id)
         assert (snapshot.stop_reason, snapshot.messages) == (StopReason.DISK, 10)
-        assert running.readings.has(done.id)
+        assert running.status_reader.has(done.id)
         ballast.unlink()
         ballast = fill(small_disk, 0)
         Source(running.queue).send(10, size=MIB)
-        await running.until(lambda: "the ring can't be written" in running.readings.last_error)
-        assert running.readings.has(done.id)
-        assert running.readings.phase.state is State.IDLE
+        await running.until(lambda: "the ring can't be written" in running.status_reader.last_error)
+        assert running.status_reader.has(done.id)
+        assert running.status_reader.phase.state is State.IDLE
         # Also by itself when there is room again.
         ballast.unlink()
-        await running.until(lambda: running.readings.writes)
-        assert running.readings.last_error == ""
+        await running.until(lambda: running.status_reader.writes)
+        assert running.status_reader.last_error == ""
 
 
 async def test_a_copy_that_shares_its_blocks_is_not_deleted_in_vain(small_disk: Path) -> None:
     room = {"min_free_bytes": 8 * MIB}
     async with running_recorder(small_disk / "root", room=room) as running:
         shared, other = await recorded(running, MIB), await recorded(running, MIB + 1)
-        for file in (running.readings.folder_of(shared) / "data").iterdir():
+        for file in (running.status_reader.folder_of(shared) / "data").iterdir():
             (small_disk / file.name).hardlink_to(file)
         fill(small_disk, 11 * MIB + MIB // 2)
         await running.operations.start("a", StartOptions())
-        assert running.readings.has(shared.id)
-        assert not running.readings.has(other.id)
+        assert running.status_reader.has(shared.id)
+        assert not running.status_reader.has(other.id)
 
 
 async def test_the_room_that_is_told_has_what_older_recordings_make(small_disk: Path) -> None:
@@ -535,22 +537,22 @@ async def test_the_room_that_is_told_has_what_older_recordings_make(small_disk: 
 
         def told() -> float:
             source.send(size=1000)
-            return running.readings.room_s or 0.0
+            return running.status_reader.room_s or 0.0
 
         await running.until(told)
-        told_bytes = (running.readings.room_s or 0.0) * running.readings.bytes_per_s
+        told_bytes = (running.status_reader.room_s or 0.0) * running.status_reader.bytes_per_s
         assert one.size + 4 * MIB < told_bytes < one.size + 6 * MIB
         await running.operations.stop("2", "")
-        assert not running.readings.disk_short
+        assert not running.status_reader.disk_short
         ballast.unlink()
         fill(small_disk, 0)
         await running.operations.pin("pin too", one.id, pinned=True)
-        await running.until(lambda: running.readings.disk_short)
+        await running.until(lambda: running.status_reader.disk_short)
 
 
 async def test_a_recording_that_was_deleted_by_hand_can_be_deleted(tmp_path: Path) -> None:
     async with running_recorder(tmp_path) as running:
         done = await recorded(running)
-        shutil.rmtree(running.readings.folder_of(done))
+        shutil.rmtree(running.status_reader.folder_of(done))
         await running.operations.delete("1", done.id, b"", force=False)
-        assert running.readings.recordings == []
+        assert running.status_reader.recordings == []

@@ -21,7 +21,7 @@ async def test_a_ring_outside_the_root_counts_as_in_the_recorder(tmp_path: Path)
     apart = {"preset": "all", "directory": str(ring)}
     room = {"quota_bytes": 100 * MIB, "min_free_bytes": 0}
     async with running_recorder(tmp_path / "root", room=room, ring=apart) as running:
-        there = running.readings.room.bytes
+        there = running.status_reader.room.bytes
         config = tmp_path / "recorder.yaml"
         presets = {"all": {"topics": ["*"]}}
         settings = {"root": str(tmp_path / "root"), "room": room, "presets": presets, "ring": apart}

@@ -102,7 +102,7 @@ async def robot(
         server, connections = rpc.new_server(), ExportConnections()
         readers = stack.enter_context(reader_threads())
         servicer = RecorderServicer(
-            running.operations, running.readings, running.settings, readers, connections
+            running.operations, running.status_reader, running.settings, readers, connections
         )
         stack.push_async_callback(servicer.close)
         servicer.register(server)

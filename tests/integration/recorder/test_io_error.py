@@ -70,11 +70,11 @@ async def test_an_io_error_ends_the_recording_and_refuses_another_one(brittle_di
         await running.written(100)
         brittle_disk.break_down()
         source.send(100, size=20_000)
-        await running.until(lambda: running.readings.running is None)
-        cut = running.readings.newest
+        await running.until(lambda: running.status_reader.running is None)
+        cut = running.status_reader.newest
         assert cut
         assert (cut.state, cut.stop_reason) == (RecordingState.FAULTED, StopReason.ERROR)
-        assert "Input/output error" in running.readings.last_error
-        assert not running.readings.disk_short, "it broke, and is not full"
+        assert "Input/output error" in running.status_reader.last_error
+        assert not running.status_reader.disk_short, "it broke, and is not full"
         with pytest.raises(PreconditionError, match="can't be written"):
             await running.operations.start("2", StartOptions())

@@ -48,10 +48,10 @@ async def test_what_is_missing_lies_in_a_gap_of_at_most_a_second_before_each_kil
         handed |= part
         kills_ns.append(max(part.values()))
     async with running_recorder(tmp_path) as running:
-        await running.until(lambda: running.readings.phase.state is State.RECORDING)
+        await running.until(lambda: running.status_reader.phase.state is State.RECORDING)
         done = (await running.operations.stop("stop", "")).recording
         assert done
-        found = numbers(running.readings, done)
+        found = numbers(running.status_reader, done)
     assert done.state is RecordingState.COMPLETE
     assert found == sorted(set(found)), "in order, and each once"
     gaps = [gap for gap in done.all_gaps if gap.cause is GapCause.INTERRUPTED]

@@ -32,9 +32,9 @@ async def test_what_was_sent_is_there_and_rosbags_opens_the_folder(tmp_path: Pat
         done = stopped.recording
         assert done
         assert (done.state, done.stop_reason) == (RecordingState.COMPLETE, StopReason.REQUESTED)
-        assert numbers(running.readings, done) == list(range(6, 106))
-        assert running.readings.live(done).lost == 0
-        folder = running.readings.folder_of(done)
+        assert numbers(running.status_reader, done) == list(range(6, 106))
+        assert running.status_reader.live(done).lost == 0
+        folder = running.status_reader.folder_of(done)
         assert running.sources.presets == frozenset()
     with Reader(folder / "data") as bag:
         assert bag.message_count == 100
@@ -59,7 +59,7 @@ async def test_requests_repeated_change_nothing_even_after_a_restart(tmp_path: P
         after = await running.operations.start("1", StartOptions())
         assert after.recording
         assert after.recording.id == first.recording.id
-        assert running.readings.phase.state is State.IDLE
+        assert running.status_reader.phase.state is State.IDLE
 
 
 async def test_a_repeated_request_is_known_after_the_clock_was_set_back(
@@ -78,9 +78,9 @@ async def test_a_repeated_request_is_known_after_the_clock_was_set_back(
 async def test_limits_end_a_recording(tmp_path: Path) -> None:
     async with running_recorder(tmp_path) as running:
         await running.operations.start("1", StartOptions(max_duration_s=1))
-        await running.until(lambda: running.readings.running is None)
-        assert running.readings.newest
-        assert running.readings.newest.stop_reason is StopReason.LIMIT
+        await running.until(lambda: running.status_reader.running is None)
+        assert running.status_reader.newest
+        assert running.status_reader.newest.stop_reason is StopReason.LIMIT
 
 
 async def test_a_long_recording_is_cut_into_segments_without_a_loss(tmp_path: Path) -> None:
@@ -94,9 +94,9 @@ async def test_a_long_recording_is_cut_into_segments_without_a_loss(tmp_path: Pa
         done = (await running.operations.stop("2", "")).recording
         assert done
         assert len(done.segments) >= 5
-        assert numbers(running.readings, done) == list(range(1, 61))
+        assert numbers(running.status_reader, done) == list(range(1, 61))
         # At the head of each segment.
-        assert numbers(running.readings, done, "/tf_static") == [1] * len(done.segments)
+        assert numbers(running.status_reader, done, "/tf_static") == [1] * len(done.segments)
 
 
 async def test_what_has_ended_is_not_repeated_at_the_head_of_a_segment(tmp_path: Path) -> None:
@@ -110,8 +110,8 @@ async def test_what_has_ended_is_not_repeated_at_the_head_of_a_segment(tmp_path:
         await running.operations.start("1", StartOptions())
         done = (await running.operations.stop("2", "")).recording
         assert done
-        assert numbers(running.readings, done, "/tf_static") == [1]
-        assert numbers(running.readings, done, "/map") == []
+        assert numbers(running.status_reader, done, "/tf_static") == [1]
+        assert numbers(running.status_reader, done, "/map") == []
 
 
 async def test_a_clock_that_steps_begins_a_segment(tmp_path: Path) -> None:
@@ -123,7 +123,7 @@ async def test_a_clock_that_steps_begins_a_segment(tmp_path: Path) -> None:
         done = (await running.operations.stop("2", "")).recording
         assert done
         assert [segment.messages for segment in done.segments] == [10, 10, 10]
-        assert running.readings.live(done).duration_ms < 60_000
+        assert running.status_reader.live(done).duration_ms < 60_000
 
 
 async def test_the_ring_is_written_and_its_topics_are_taken_only_once_it_is_open(
@@ -138,17 +138,17 @@ async def test_the_ring_is_written_and_its_topics_are_taken_only_once_it_is_open
 
     monkeypatch.setattr(Output, "open", slow)
     async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
-        assert not running.readings.writes
+        assert not running.status_reader.writes
         assert not running.sources.presets
         released.set()
-        await running.until(lambda: running.readings.writes)
+        await running.until(lambda: running.status_reader.writes)
         assert running.sources.presets == {"all"}
 
 
 async def test_overlapping_snapshots_share_what_is_on_the_disk(tmp_path: Path) -> None:
     async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
         source = Source(running.queue)
-        await running.until(lambda: running.readings.writes)
+        await running.until(lambda: running.status_reader.writes)
         source.send(50)
         first = await running.operations.snapshot("1", SnapshotOptions(pre_s=10, post_s=1), "someone")
         second = await running.operations.snapshot("2", SnapshotOptions(pre_s=10, post_s=1), "another")
@@ -156,14 +156,17 @@ async def test_overlapping_snapshots_share_what_is_on_the_disk(tmp_path: Path) -
         assert second.recording
         asked_s = time.monotonic()
         source.send(50)
-        await running.until(lambda: not running.readings.snapshots_pending)
+        await running.until(lambda: not running.status_reader.snapshots_pending)
         assert time.monotonic() - asked_s < 5
-        made = [running.readings.get(each.recording.id) for each in (first, second) if each.recording]
+        made = [running.status_reader.get(each.recording.id) for each in (first, second) if each.recording]
         for each in made:
             assert (each.state, each.kind) == (RecordingState.COMPLETE, Kind.SNAPSHOT)
-            assert numbers(running.readings, each) == list(range(1, 101))
+            assert numbers(running.status_reader, each) == list(range(1, 101))
         inodes = [
-            {(running.readings.folder_of(each) / segment.name).stat().st_ino for segment in each.segments}
+            {
+                (running.status_reader.folder_of(each) / segment.name).stat().st_ino
+                for segment in each.segments
+            }
             for each in made
         ]
         assert inodes[0] & inodes[1]
@@ -178,11 +181,11 @@ async def test_a_fault_makes_an_incident_and_its_repetition_none(tmp_path: Path)
         made = await running.operations.report_fault("vision.silent", 3, "nothing comes")
         assert made
         assert await running.operations.report_fault("vision.silent", 3, "nothing comes") == made
-        await running.until(lambda: not running.readings.snapshots_pending)
-        incident = running.readings.get(made)
+        await running.until(lambda: not running.status_reader.snapshots_pending)
+        incident = running.status_reader.get(made)
         assert incident.kind is Kind.INCIDENT
         assert incident.trigger == "vision.silent: nothing comes"
-        assert len(running.readings.recordings) == 1
+        assert len(running.status_reader.recordings) == 1
 
 
 async def test_deleting_needs_a_reason_that_is_good_enough(tmp_path: Path) -> None:
@@ -196,8 +199,8 @@ async def test_deleting_needs_a_reason_that_is_good_enough(tmp_path: Path) -> No
         with pytest.raises(PreconditionError, match="pinned"):
             await running.operations.delete("5", done.id, done.sha256, force=False)
         await running.operations.delete("6", done.id, done.sha256, force=True)
-        assert running.readings.recordings == []
-        assert not running.readings.folder_of(done).exists()
+        assert running.status_reader.recordings == []
+        assert not running.status_reader.folder_of(done).exists()
         assert (await running.operations.delete("6", done.id, done.sha256, force=True)).message
         with pytest.raises(NotFoundError):
             await running.operations.delete("7", done.id, b"", force=False)
@@ -216,7 +219,7 @@ async def test_a_copy_tells_what_the_manifest_knows(tmp_path: Path) -> None:
         copied = tmp_path / "copy"
         for file in done.files:
             (copied / file.name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(running.readings.folder_of(done) / file.name, copied / file.name)
+            shutil.copy(running.status_reader.folder_of(done) / file.name, copied / file.name)
     with Reader(copied / "data") as bag:
         assert bag.message_count == 1
     content = yaml.safe_load((copied / "data" / "metadata.yaml").read_text(encoding="utf-8"))

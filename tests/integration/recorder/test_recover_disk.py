@@ -23,9 +23,9 @@ async def cut_off(root: Path) -> Path:
         await running.operations.start("1", StartOptions())
         Source(running.queue).send(50)
         await running.written(50)
-        open_manifest = running.readings.running
+        open_manifest = running.status_reader.running
         assert open_manifest
-        folder = running.readings.folder_of(open_manifest)
+        folder = running.status_reader.folder_of(open_manifest)
         part = next((folder / "data").glob("*.part"))
         content = part.read_bytes()
     for file in (folder / "data").iterdir():
@@ -75,7 +75,7 @@ async def test_what_a_recorder_writes_is_refused_whatever_is_named(tmp_path: Pat
                 recover_below(path)
             done = (await running.operations.stop("2", "")).recording
             assert done
-            assert numbers(running.readings, done) == list(range(1, 51))
+            assert numbers(running.status_reader, done) == list(range(1, 51))
 
 
 def test_a_ring_of_its_own_is_refused_while_it_is_written(tmp_path: Path) -> None:

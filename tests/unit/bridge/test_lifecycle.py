@@ -2,8 +2,8 @@
 
 import pytest
 
+from bridge.connection_status import STATES
 from bridge.lifecycle import TRANSITIONS, Event, Phase, State, step
-from bridge.status import STATES
 
 
 def test_the_table_is_total() -> None:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.commands.ages import HubTime, age_s, hub_time
+from bridge.commands.hub_time import HubTime, age_s, hub_time
 from bridge.commands.judgement import Denial, Request, Snapshot, Stray, Upload, judge
 from omniseer.fleet.v1 import command_pb2 as pb
 

@@ -1,4 +1,4 @@
-"""The table of an upload's states, its pauses, and the order of the queue."""
+"""The table of an upload's states, its backoff, and the order of the queue."""
 
 from dataclasses import replace
 

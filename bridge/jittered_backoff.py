@@ -10,7 +10,7 @@ FIRST_S: Final = 1.0
 LONGEST_S: Final = 60.0
 
 
-class Pauses:
+class JitteredBackoff:
     """Pauses of 1 s to 60 s, each between half and all of what the backoff says, so that no fleet is in step.
 
     Args:

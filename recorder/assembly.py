@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from recorder.config import RecorderSettings
-from recorder.life import Life
+from recorder.lifecycle_runner import LifecycleRunner
 from recorder.manual_recorder import ManualRecorder
 from recorder.outputs import Outputs, Sources
 from recorder.reports import Reports
@@ -19,14 +19,14 @@ from recorder.writing.writer import Latched, Writer
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """What the recorder, its operations and its readings share. `ring` is None if none is configured."""
+    """What the recorder, its operations and its status reader share. `ring` is None if none is configured."""
 
     settings: RecorderSettings
     boot_id: str
     run_id: str
     queue: SampleQueue
     sources: Sources
-    life: Life
+    lifecycle: LifecycleRunner
     catalogue: Catalogue
     state_file: StateFile
     reserve: Reserve
@@ -39,7 +39,7 @@ class Parts:
     ring: RingRecorder | None
 
 
-def parts_of(
+def build(
     settings: RecorderSettings,
     queue: SampleQueue,
     sources: Sources,
@@ -58,7 +58,7 @@ def parts_of(
         boot_id: of the computer; empty if unknown.
         run_id: random for every process.
     """
-    life, outputs, reports = Life(), Outputs(sources), Reports()
+    lifecycle, outputs, reports = LifecycleRunner(), Outputs(sources), Reports()
     catalogue = Catalogue(settings.root)
     state_file = StateFile(settings.root, boot_id)
     reserve = Reserve(settings.root)
@@ -67,7 +67,7 @@ def parts_of(
     housekeeping = Housekeeping(settings, catalogue, segments)
     manual = ManualRecorder(
         settings,
-        life,
+        lifecycle,
         catalogue,
         outputs,
         writer,
@@ -94,7 +94,7 @@ def parts_of(
         run_id=run_id,
         queue=queue,
         sources=sources,
-        life=life,
+        lifecycle=lifecycle,
         catalogue=catalogue,
         state_file=state_file,
         reserve=reserve,

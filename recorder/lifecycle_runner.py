@@ -14,7 +14,7 @@ _FIRST_RETRY_S: Final = 1.0
 _LONGEST_RETRY_S: Final = 30.0
 
 
-class Life:
+class LifecycleRunner:
     """Keeps the phase; used on one event loop.
 
     Attributes:

@@ -6,11 +6,11 @@ import time
 from typing import Final
 
 from bridge.clock import synchronised_unix_s
-from bridge.commands.ages import HubTime, age_s, hub_time
-from bridge.commands.desk import Desk, Pending
+from bridge.commands.hub_time import HubTime, age_s, hub_time
 from bridge.commands.judgement import Denial, Request, Stray, judge
+from bridge.commands.pending_requests import Pending, PendingRequests
 from bridge.config import BridgeSettings
-from bridge.pauses import Pauses
+from bridge.jittered_backoff import JitteredBackoff
 from bridge.values import OutboxError
 from common.token_bucket import TokenBucket
 from fleet.connection import Delivery, Hub
@@ -27,23 +27,23 @@ _TIME_GOOD_S: Final = 3600.0
 """Quartz clocks differ by less than 0.4 s in that time."""
 
 
-class CommandTaker:
+class CommandConsumer:
     """Takes commands until cancelled.
 
     Args:
         settings: of the bridge; `commands.allowed` is not empty.
         hub: brings them.
-        desk: where requests wait for the gateway.
+        requests: where requests wait for the gateway.
 
     Attributes:
         strays: messages that were no command to this robot.
         denied: commands that were refused or had expired.
     """
 
-    def __init__(self, settings: BridgeSettings, hub: Hub, desk: Desk) -> None:
+    def __init__(self, settings: BridgeSettings, hub: Hub, requests: PendingRequests) -> None:
         self._robot = settings.hub.robot
         self._allowed = frozenset(settings.commands.allowed)
-        self._hub, self._desk = hub, desk
+        self._hub, self._requests = hub, requests
         self._bucket = TokenBucket(_BURST, time.monotonic())
         self._time: HubTime | None = None
         self._time_of = 0
@@ -53,29 +53,29 @@ class CommandTaker:
 
     async def run(self) -> None:
         """Takes commands; a failure of hub or disk is tried again for as long as it takes."""
-        pauses = Pauses()
+        backoff = JitteredBackoff()
         try:
             while True:
                 try:
-                    await self._desk.end_those_of_an_earlier_run()
+                    await self._requests.end_those_of_an_earlier_run()
                     async for delivery in self._hub.pull(COMMANDS, self._robot, batch=1):
                         await self._have_room()
                         await self._take(delivery)
-                        pauses.reset()
+                        backoff.reset()
                 except (HubError, OutboxError) as error:
                     # What is not acknowledged comes again.
                     _log.warning("commands of the hub wait: %s", error)
-                await pauses.wait()
+                await backoff.wait()
         finally:
             for task in self._waiting:
                 task.cancel()
 
     async def _have_room(self) -> None:
         """Waits while as many requests are pending as may be, and for the rate limit."""
-        while self._desk.is_full or not self._bucket.take(
+        while self._requests.is_full or not self._bucket.take(
             time.monotonic(), capacity=_BURST, refill_per_s=_PER_S
         ):
-            await self._desk.expire()
+            await self._requests.expire()
             await asyncio.sleep(_LOOK_S)
 
     async def _take(self, delivery: Delivery) -> None:
@@ -96,15 +96,15 @@ class CommandTaker:
 
     async def _deny(self, denial: Denial, delivery: Delivery) -> None:
         # A command that waits for the gateway comes again after a while, and may have expired meanwhile.
-        if not self._desk.has(denial.command_id):
+        if not self._requests.has(denial.command_id):
             _log.warning("command %s of the hub: %s", denial.command_id, denial.message)
-            await self._desk.deny(denial)
+            await self._requests.deny(denial)
             await delivery.ack()
 
     async def _hand_over(self, request: Request, delivery: Delivery) -> None:
-        if self._desk.has(request.command_id):
+        if self._requests.has(request.command_id):
             return
-        pending = await self._desk.add(request)
+        pending = await self._requests.add(request)
         if pending is None:
             await delivery.ack()
             return
@@ -115,7 +115,7 @@ class CommandTaker:
 
     async def _acknowledge(self, pending: Pending, delivery: Delivery) -> None:
         while not pending.ended.is_set():
-            await self._desk.expire()
+            await self._requests.expire()
             try:
                 async with asyncio.timeout(_LOOK_S):
                     await pending.ended.wait()

@@ -30,7 +30,7 @@ class Pending:
     ended: asyncio.Event
 
 
-class Desk:
+class PendingRequests:
     """Used on one event loop.
 
     Args:

@@ -7,8 +7,8 @@ from typing import Final
 from common.broadcast import Broadcast
 from common.errors import NotFoundError
 from common.reasons import Reason
+from recorder.assembly import Parts
 from recorder.lifecycle import Phase
-from recorder.parts import Parts
 from recorder.requests import Live
 from recorder.store.housekeeping import LEAST_ROOM, Room
 from recorder.store.manifest import Manifest
@@ -17,7 +17,7 @@ NEWEST_ENDED: Final = 16
 _SHORT_S: Final = 3600.0
 
 
-class Readings:
+class StatusReader:
     """The recorder as it is at this moment; used on its event loop.
 
     Args:
@@ -31,14 +31,14 @@ class Readings:
     @property
     def changes(self) -> Broadcast:
         """Notified of every change but those that go on all the time: times, the disk's free bytes."""
-        return self._parts.life.changes
+        return self._parts.lifecycle.changes
 
     @property
     def change_key(self) -> Hashable:
         """Differs whenever something has changed of which `changes` notifies."""
         parts = self._parts
         return (
-            parts.life.phase,
+            parts.lifecycle.phase,
             self.last_error,
             self.disk_short,
             self.snapshots_pending,
@@ -49,7 +49,7 @@ class Readings:
     @property
     def phase(self) -> Phase:
         """The lifecycle's state."""
-        return self._parts.life.phase
+        return self._parts.lifecycle.phase
 
     @property
     def last_error(self) -> str:
@@ -57,7 +57,7 @@ class Readings:
         parts = self._parts
         ring = parts.ring.problem if parts.ring else ""
         recordings = next(iter(list(parts.catalogue.problems.values())), "")
-        return parts.life.error or ring or parts.sources.problem or recordings
+        return parts.lifecycle.error or ring or parts.sources.problem or recordings
 
     @property
     def running(self) -> Manifest | None:
@@ -99,7 +99,7 @@ class Readings:
     @property
     def disk_short(self) -> bool:
         """Whether there is room for less than an hour, or a recording has ended for want of it."""
-        if self._parts.life.stopped_by_disk:
+        if self._parts.lifecycle.stopped_by_disk:
             return True
         if not self.room.disk.size_bytes:
             return False  # It has not been measured yet.
