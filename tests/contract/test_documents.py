@@ -94,3 +94,10 @@ def test_a_decision_is_one_page_of_context_decision_and_consequences(record: Pat
     assert re.findall(r"^## (.+)$", text, re.MULTILINE) == ["Context", "Decision", "Consequences"]
     assert re.match(rf"# {record.name[:4]}: .+\n\nStatus: ", text)
     assert len(text.splitlines()) <= 50
+
+
+def test_the_glossary_has_each_term_once_and_in_order() -> None:
+    table = (ROOT / "docs/glossary.md").read_text(encoding="utf-8").split("\n\n| use | not |")[0]
+    terms = [line.split("|")[1].strip().lower() for line in table.splitlines() if line.startswith("| ")][1:]
+    assert len(terms) > 100
+    assert terms == sorted(set(terms))
