@@ -149,7 +149,7 @@ class QueuedUploads:
 
 
 async def apply_rule(uploads: "Uploads", gateway: GatewayCalls) -> None:
-    """Has the uploads look at the robot's recordings every 30 s, until cancelled."""
+    """Makes the uploads look at the robot's recordings every 30 s, until cancelled."""
     backoff = JitteredBackoff()
     while True:
         try:

@@ -37,7 +37,7 @@ def usage_error(error: typer.TyperException, name: str, options: str = "") -> Us
 
 
 def read_plainly(command: Any) -> None:
-    """Has the parameters of a command, and of all commands of a group, read by `PlainValue`."""
+    """Reads the parameters of a command, and of all commands of a group, by `PlainValue`."""
     for parameter in command.get_params(typer.Context(command)):  # with --help, which is none of its `params`
         # Typer makes its own reader when the first value comes, unless there is one already.
         parameter._runtime_param = PlainValue(parameter.type_descriptor)  # no public way

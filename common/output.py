@@ -5,7 +5,7 @@ import sys
 
 
 def tolerate_encoding() -> None:
-    """Has both output streams replace what they can't encode, °C in an ASCII locale for example."""
+    """Makes both output streams replace what they can't encode, °C in an ASCII locale for example."""
     for stream in (sys.stdout, sys.stderr):
         # Not a stream that a test or a launcher has put there instead.
         if isinstance(stream, io.TextIOWrapper):

@@ -72,7 +72,7 @@ def run(main: Callable[[asyncio.Event], Coroutine[Any, Any, None]]) -> None:
 
 
 def bound_arenas() -> None:
-    """Has glibc serve all threads from two arenas, before there are other threads.
+    """Makes glibc serve all threads from two arenas, before there are other threads.
 
     By default there are up to eight for each core, and what is free in one serves no thread of another.
     Does nothing with another C library.

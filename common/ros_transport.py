@@ -52,7 +52,7 @@ _LOCALHOST_OVER_UDP: Final = f"""\
 
 
 def use_udp(directory: Path) -> None:
-    """Has the nodes of this process and of its children use UDP; must be called before the first.
+    """Makes the nodes of this process and of its children use UDP; must be called before the first.
 
     Other middlewares ignore it.
 
@@ -80,7 +80,7 @@ def use_udp(directory: Path) -> None:
 
 @contextmanager
 def chosen_transport() -> Iterator[None]:
-    """Has the nodes that are made in the block use UDP if the environment asks for it.
+    """Makes the nodes that are made in the block use UDP if the environment asks for it.
 
     Raises:
         UserError: the environment asks for something else, or there is no room for a file of profiles.

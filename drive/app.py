@@ -92,7 +92,7 @@ def work(settings: DriveSettings) -> None:
 
 
 def _keep_loss(settings: DriveSettings, worker: Worker) -> None:
-    """Has the next start find a stop, where a driver lost the robot by the end of the guard.
+    """Leaves a stop for the next start, where a driver lost the robot by the end of the guard.
 
     Otherwise the guard keeps stops, and the motion that is to be recorded; it has gone.
     """

@@ -97,7 +97,7 @@ class StopFile:
         self._thread.start()
 
     def keep(self, stops: Stops) -> None:
-        """Has the stops written, unless they are those that were written last."""
+        """Queues the stops to be written, unless they are those that were written last."""
         with self._changed:
             self._newest = stops
             self._changed.notify()

@@ -31,7 +31,7 @@ class NoRecordings:
         _refuse()
 
     async def recording_thumbnail(self, recording_id: str) -> NoReturn:
-        """Has no picture."""
+        """Returns no picture."""
         del recording_id
         _refuse()
 

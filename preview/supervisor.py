@@ -266,7 +266,7 @@ class Supervisor:
     # --- for the video tap ---
 
     def record(self, recording: Recording | None) -> None:
-        """Has a pipeline run for a recording, which gets every access unit from now on; None: for none."""
+        """Keeps a pipeline running for a recording, which gets every access unit; None: for none."""
         if self._closed and recording:
             return
         self._recording = recording
@@ -471,7 +471,7 @@ class Supervisor:
         return True
 
     def _forget_listener_retry(self) -> None:
-        """Has the listener tried again now, if it waits for that."""
+        """Tries the listener again now, if it waits for that."""
         if self._listener_retry.cancel():
             self._wake.set()
 

@@ -106,7 +106,7 @@ class VideoTap:
             reader.send(unit)
 
     def interrupted(self) -> None:
-        """Has all readers wait for a key frame of the next pipeline."""
+        """Makes all readers wait for a key frame of the next pipeline."""
         for reader in self._readers:
             reader.interrupt()
 

@@ -33,7 +33,7 @@ _NS_PER_MS: Final = 1_000_000
 def _changing(
     operation: "Callable[Concatenate[Operations, _P], Coroutine[Any, Any, _T]]",
 ) -> "Callable[Concatenate[Operations, _P], Coroutine[Any, Any, _T]]":
-    """Has an operation hold the recorder's lock, and go on to its end when its caller has left.
+    """Decorates an operation: it holds the recorder's lock, and goes on to its end when its caller has left.
 
     Callers leave at any time: a deadline passes while a slow disk opens a file. Half an operation would stay.
     """

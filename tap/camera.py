@@ -65,7 +65,7 @@ class Camera:
         self.type_name = ""
 
     def examine(self) -> None:
-        """Has the subscription follow the publishers, twice a second."""
+        """Adapts the subscription to the publishers, twice a second."""
         now_s = time.monotonic()
         if now_s < self._examine_at_s:
             return

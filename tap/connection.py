@@ -89,7 +89,7 @@ class Connection:
         return not self._thread.is_alive()
 
     def close(self) -> None:
-        """Has the thread end soon."""
+        """Makes the thread end soon."""
         self._closing.set()
 
     def join(self, timeout_s: float) -> bool:

@@ -65,7 +65,7 @@ async def _copied(target: str, streams: Sequence[Stream]) -> Copied:
 
 @contextmanager
 def copier(target: str, streams: Sequence[Stream]) -> Iterator[None]:
-    """Has a process of its own make the calls, over and over, while the block lasts."""
+    """Makes the calls from a process of its own, over and over, while the block lasts."""
     words = [json.dumps([[each.method, each.request.hex()] for each in streams])]
     with program("bench.export.copying", target, *words):
         yield

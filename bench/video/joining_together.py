@@ -90,7 +90,7 @@ def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
 
 
 def one_round(robot: product.Robot, viewers: int = VIEWERS) -> Joined:
-    """Has viewers join at once, beside one that observes the stream."""
+    """Lets viewers join at once, beside one that observes the stream."""
     waits = [_Wait() for _ in range(viewers)]
     sessions = [VideoSession(pixels=PixelFormat.I420) for _ in waits]
     with robot.preview(), ThreadPoolExecutor(1) as observer, ExitStack() as stack:

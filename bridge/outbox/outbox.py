@@ -122,7 +122,7 @@ class Outbox:
 
 @asynccontextmanager
 async def outbox(directory: Path, max_bytes: int) -> AsyncIterator[Outbox]:
-    """Has an outbox until the block ends.
+    """Yields an outbox, which is closed when the block ends.
 
     Args:
         directory: of its files.

@@ -97,7 +97,7 @@ def _login(path: Path) -> Credentials:
 
 @asynccontextmanager
 async def events(settings: GatewaySettings, after: Position | None) -> AsyncIterator[Responses]:
-    """Has the stream of events after a position; None begins with the oldest that is kept.
+    """Opens the stream of events after a position; None begins with the oldest that is kept.
 
     Raises:
         UserError: the credentials can't be read, or would be sent in the clear.
@@ -110,7 +110,7 @@ async def events(settings: GatewaySettings, after: Position | None) -> AsyncIter
 
 @asynccontextmanager
 async def statuses(settings: GatewaySettings) -> AsyncIterator[Responses]:
-    """Has the stream of statuses, at most one a second; raises as `events`."""
+    """Opens the stream of statuses, at most one a second; raises as `events`."""
     request = watch_request(_STATUS_INTERVAL_S, include_detections=False)
     async with _stream(settings, STATUS, request, newest_only=True) as responses:
         yield responses

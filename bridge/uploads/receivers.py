@@ -100,7 +100,7 @@ class Receivers:
     async def complete_file(
         self, recording_id: str, file: RecordingFile, upload_id: str, etags: Sequence[str]
     ) -> None:
-        """Has the parts put together."""
+        """Requests that the parts are put together."""
         parts = [pb.Part(number=number, etag=etag) for number, etag in enumerate(etags, start=1)]
         request = pb.CompleteFileRequest(
             recording_id=recording_id, file_name=file.name, upload_id=upload_id, parts=parts
@@ -108,13 +108,13 @@ class Receivers:
         await self._request("complete_file", request)
 
     async def verify_file(self, recording_id: str, file: RecordingFile) -> pb.SignedReceipt:
-        """Has a file read again, and returns its receipt, which is still to be checked."""
+        """Requests that a file is read again, and returns its receipt, which is still to be checked."""
         request = pb.VerifyFileRequest(recording_id=recording_id, file=file)
         limit_s = _SHORTEST_READING_S + file.size / _SLOWEST_BYTES_PER_S
         return await self._receipt("verify_file", request, lambda answer: answer.bytes_done, limit_s)
 
     async def complete_upload(self, recording: Recording, names: Sequence[str]) -> pb.SignedReceipt:
-        """Has the receipt of the whole recording made; it is still to be checked."""
+        """Requests the receipt of the whole recording; it is still to be checked."""
         request = pb.CompleteUploadRequest(recording=recording, file_names=names)
         limit_s = _SHORTEST_READING_S + len(names)
         return await self._receipt("complete_upload", request, lambda answer: answer.files_done, limit_s)

@@ -20,7 +20,7 @@ _ANSWER_WITHIN_S: Final = 0.2
 
 @asynccontextmanager
 async def reporting_keys(keyboard: Keyboard) -> AsyncIterator[Liveness | None]:
-    """Has the terminal report releases, where it can, and its focus, while the block lasts.
+    """Makes the terminal report releases, where it can, and its focus, while the block lasts.
 
     Yields whether it still answers; None for a terminal that does not report releases.
     """
@@ -48,7 +48,7 @@ def ask() -> None:
 
 
 async def _report_releases(keyboard: Keyboard, modes: ExitStack) -> Liveness | None:
-    """Has it report releases until the modes are left, and say that it does: some have the rest alone."""
+    """Makes it report releases until the modes are left, and say that it does: some have the rest alone."""
     if drive_keys.flags_in(await _answer(keyboard)) is None:
         return None
     with ExitStack() as begun:

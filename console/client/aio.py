@@ -380,7 +380,7 @@ class AsyncGatewayClient:
         return await self._call_recording(DELETE_RECORDING, request)
 
     async def upload_recording(self, recording_id: str) -> results.UploadAnswer:
-        """Has the robot copy a recording to its fleet's store; returns when it is in the queue.
+        """Requests that the robot copies a recording to its fleet's store; returns when it is in the queue.
 
         Raises:
             Refused: The robot is not set up for a fleet, or the recording has not ended, for example.

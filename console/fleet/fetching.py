@@ -55,7 +55,7 @@ class ReceiverUrls:
         return self._known[name]
 
     def forget(self, name: str) -> None:
-        """Has the next call request a new URL."""
+        """Makes the next call request a new URL."""
         self._known.pop(name, None)
 
     async def _requested(self, name: str) -> str:

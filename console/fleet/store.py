@@ -46,7 +46,7 @@ class Urls(Protocol):
         """Returns the URL of a file, or raises a `GatewayError`."""
 
     def forget(self, name: str) -> None:
-        """Has the next call request a new URL."""
+        """Makes the next call request a new URL."""
 
 
 class StoreTransport:

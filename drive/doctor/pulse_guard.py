@@ -27,7 +27,7 @@ _MAX_BYTES: Final = 4096
 
 
 def guarded_pulse(node: Any, settings: DriveSettings, config_file: Path | None) -> PulseFacts:
-    """Has a process of its own move the robot; returns what that has shown.
+    """Moves the robot from a process of its own; returns what that has shown.
 
     It ends with zeros, whatever happens to either process. If both are frozen or killed at once, only the
     base's own timeout stops the robot.

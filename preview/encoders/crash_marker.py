@@ -50,7 +50,7 @@ class CrashMarkerFile:
         self._report_file: IO[bytes] | None = None
 
     def blame_previous(self, selection: Selection) -> None:
-        """Has the encoder that ended the previous process passed over; starts this process's crash report."""
+        """Passes over the encoder that ended the previous process; starts this process's crash report."""
         crash = self.begin_report()
         try:
             self._claim()

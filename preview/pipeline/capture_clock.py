@@ -29,7 +29,7 @@ _PREROLL_NS: Final = 300 * 1_000_000
 
 
 def use(pipeline: Any) -> None:
-    """Has a pipeline run on CLOCK_MONOTONIC, whatever clock its elements offer."""
+    """Makes a pipeline run on CLOCK_MONOTONIC, whatever clock its elements offer."""
     clock = Gst.SystemClock.obtain()
     Gst.util_set_object_arg(clock, "clock-type", "monotonic")
     pipeline.use_clock(clock)

@@ -81,12 +81,12 @@ class Framing:
         os.close(self._write_fd)
 
     def send_to(self, fd: int) -> None:
-        """Has the frames from now on sent to another file, of which a copy is kept."""
+        """Sends the frames from now on to another file, of which a copy is kept."""
         # One step for whatever writes at this moment: the number stays, the file is another one (dup2(2)).
         os.dup2(fd, self._write_fd, inheritable=False)
 
     def send_to_nobody(self) -> None:
-        """Has the frames from now on discarded."""
+        """Discards the frames from now on."""
         null = os.open(os.devnull, os.O_WRONLY | os.O_CLOEXEC)
         self.send_to(null)
         os.close(null)

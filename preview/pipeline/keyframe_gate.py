@@ -64,7 +64,7 @@ class KeyframeGate:
         """Ends the watching of a listener."""
 
     def watch(self, sink: Any) -> None:
-        """Has the viewers that connect to a listener served."""
+        """Serves the viewers that connect to a listener."""
         self._disconnect = partial(sink.disconnect, sink.connect("caller-added", self._on_caller))
 
     def unwatch(self) -> None:
@@ -116,7 +116,7 @@ class KeyframeGate:
         self._request_key_frame()
 
     def _await_key_frame(self) -> None:
-        """Has the frames examined until the key frame; the lock is held."""
+        """Examines the frames until the key frame; the lock is held."""
         self._may_await = _MAX_AWAITED
         if self._probe_id is None and self._pad is not None:
             self._probe_id = self._pad.add_probe(Gst.PadProbeType.BUFFER, self._probe)

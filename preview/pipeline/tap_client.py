@@ -109,7 +109,7 @@ class TapClient:
         return frame
 
     def shut_down(self) -> None:
-        """Has a `receive` in another thread end at once."""
+        """Ends a `receive` in another thread at once."""
         try:
             self._socket.shutdown(socket.SHUT_RDWR)
         except OSError as error:

@@ -101,7 +101,7 @@ class Intake:
         self._wanted = presets
 
     def catch_up(self) -> int:
-        """Has the next pass tell all losses so far; returns a ticket, which `caught_up` reaches then.
+        """Requests a report of all losses so far; returns a ticket, which `caught_up` reaches then.
 
         By then everything that had come before is in the queue, too. For one other thread.
         """

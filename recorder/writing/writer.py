@@ -118,7 +118,7 @@ class Writer:
         return self._thread.is_alive()
 
     def _submit(self, work: Callable[[], _T]) -> "Future[_T]":
-        """Has the thread do something; the future fails with its OSError, or with WriterEndedError."""
+        """Queues something for the thread; the future fails with its OSError, or with WriterEndedError."""
         job = _Job(work)
         with self._submitting:
             if self._ended:

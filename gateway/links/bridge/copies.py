@@ -1,4 +1,4 @@
-"""Has the recorder keep what the bridge reports of copies: retention spares what is still to be copied.
+"""Passes on to the recorder what the bridge reports of copies: retention spares what is still to be copied.
 
 Level-triggered: what counts is the newest report, not how it came about.
 

@@ -35,7 +35,7 @@ class Uploads:
     async def queue(
         self, request_id: str, recording_id: str, caller: str, remaining_s: float | None
     ) -> RecordingCopy:
-        """Has a recording copied; returns where its copy stands.
+        """Queues a recording to be copied; returns where its copy stands.
 
         Args:
             request_id: repeated, it gets the first answer.

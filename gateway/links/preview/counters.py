@@ -36,7 +36,7 @@ class CounterTotals:
         self.total = Counters(*map(add, astuple(self.total), astuple(added)))
 
     def next_start_is_restart(self) -> None:
-        """Has the next start counted as a restart: what had been applied is applied to a new process."""
+        """Counts the next start as a restart: what had been applied is applied to a new process."""
         self._start_is_restart = True
 
     def add_fault(self) -> None:

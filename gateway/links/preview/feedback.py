@@ -87,7 +87,7 @@ class Feedback(SharingConnector[PreviewServiceClient]):
             raise NotRunningError(f"the preview service refused: {error}") from None
 
     def pass_on(self, age_ms: int) -> None:
-        """Has an age passed on; a newer one replaces it. Never waits."""
+        """Queues an age to be passed on; a newer one replaces it. Never waits."""
         self._age_ms = age_ms
         self._reported.set()
 

@@ -65,7 +65,7 @@ class RecorderCalls(SharingConnector[RecorderClient]):
             )
 
     async def set_copy(self, report: CopyReport) -> None:
-        """Has the recorder keep the state of a recording's copy, for its retention and for operators.
+        """Reports the state of a copy, which the recorder keeps for its retention and for operators.
 
         Raises:
             DomainError: the recorder refuses, or does not answer.

@@ -24,7 +24,7 @@ _LONGEST_PAUSE_S: Final = 2.0
 
 
 class Incidents:
-    """Has each fault of the severity ERROR reported once, when it is raised or becomes one.
+    """Reports each fault of the severity ERROR once, when it is raised or becomes one.
 
     What the recorder does not get within EXPIRED_S is dropped. At most as many wait as faults are listed.
 

@@ -160,7 +160,7 @@ class RecorderClient:
         return (await self._stub.ReportFault(request, timeout=timeout_s)).recording_id
 
     async def set_copy(self, report: CopyReport, timeout_s: float) -> None:
-        """Has the state of a copy kept."""
+        """Reports the state of a copy, which the recorder keeps."""
         copy = report.copy
         request = pb.SetCopyRequest(recording_id=report.recording_id)
         number: Any = next(number for number, each in _COPY_STATES.items() if each is copy.state)

@@ -89,7 +89,7 @@ class AcceptedSockets:
             connection.setsockopt(socket.SOL_SOCKET, _SO_MAX_PACING_RATE, rate)
 
     def mute(self, address: str) -> bool:
-        """Has the kernel drop every further packet of this peer, and returns whether it does.
+        """Makes the kernel drop every further packet of this peer, and returns whether it does.
 
         Unlike a peer whose connection is closed, it does not connect again before it has noticed. gRPC closes
         the connection when a keepalive ping stays unanswered. Some kernels permit it to root alone.
@@ -100,7 +100,7 @@ class AcceptedSockets:
         return False
 
     def apply(self, policy: ConnectPolicy) -> bool:
-        """Has the kernel drop the attempts to connect that the policy does not let through, and no others.
+        """Makes the kernel drop the attempts to connect that the policy does not let through, and no others.
 
         Open connections stay open. An attempt that is dropped gets no answer at all.
 

@@ -166,7 +166,7 @@ class ConnectionGuard:
         return replace(state, before=received, since_s=now_s, throttled=excessive)
 
     def _filter(self, sockets: AcceptedSockets) -> None:
-        """Has the kernel keep away those who may not connect now."""
+        """Makes the kernel keep away those who may not connect now."""
         wanted = self._admission.connect_policy()
         if wanted == self._wanted:
             return

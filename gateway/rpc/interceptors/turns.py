@@ -43,7 +43,7 @@ class _Queue:
 
 
 class Turns(Interceptor[CallContext]):
-    """Has calls of restrained connections wait for their turn; others, and stops of known callers, pass.
+    """Makes calls of restrained connections wait for their turn; others, and stops of known callers, pass.
 
     When a connection is admitted, all its calls go on at once. Used on one event loop.
 
