@@ -211,7 +211,10 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("console/viewer/", (*HEAVY, *WIRE, "common.gst", "console.window", "console.cli")),
         (
             "console/monitor/",
-            (*HEAVY, *WIRE, "common.gst", "console.receiver", "console.window", "console.cli"),
+            (
+                *(*HEAVY, *WIRE, "common.gst"),
+                *("console.receiver", "console.viewer", "console.window", "console.cli"),
+            ),
         ),
         ("console/gamepad/", (*HEAVY, *WIRE, "asyncio", "console.window", "console.monitor", "console.cli")),
         *(
