@@ -52,7 +52,7 @@ In a second terminal, for example:
   .venv/bin/robotctl{target} watch
   .venv/bin/robotctl{target} overlay
   .venv/bin/robotctl{target} drive      (w a s d while the key is down; space stops, r resets that, x ends)
-  .venv/bin/robotctl{target} stop       (stops it, no matter who drives; reset-stop ends that)
+  .venv/bin/robotctl{target} stop       (stops it, no matter who drives; r in drive ends that)
   .venv/bin/simrobot {silence}    (resume brings it back)
 While the preview runs, its picture:
   ffplay -fflags nobuffer -flags low_delay '{uri}?latency={_SRT_LATENCY_MS * 1000}'
