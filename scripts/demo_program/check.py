@@ -158,7 +158,7 @@ def _drives_and_stops(programs: Programs, robot: GatewayClient) -> str:
         programs.wait_until(
             lambda: _if_stopped(robot), _SEEN_WITHIN_S, "the robot stands still, and its status says why"
         )
-        # While there is a driver: without one, the reset would leave the robot to its autonomy, and is refused.
+        # While there is a driver: without one the reset is refused, as autonomy would have the robot again.
         robot.reset_stop(stopped.stop.stop_id)
     return (
         f"back at {-_DRIVEN_MPS} m/s while the driver held, by the base's odometry; "

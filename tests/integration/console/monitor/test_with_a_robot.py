@@ -18,6 +18,7 @@ from PySide6.QtGui import QImage
 from PySide6.QtTest import QTest
 
 from bench.loop_delay import LoopDelay
+from console.monitor.history import METRICS
 from console.window.fault_line import FaultLine
 from console.window.lines import StatusLine
 from console.window.monitor_window import MonitorWindow
@@ -46,6 +47,11 @@ class Watch:
             if line.label.text() == name:
                 return line
         raise LookupError(name)
+
+    def plotted(self, title: str) -> str:
+        """The newest value of a plot, as it is written."""
+        index = [metric.title for metric in METRICS].index(title)
+        return str(self.window.plots.all[index].value_text)
 
     def mark_is(self, name: str, mark: str) -> None:
         until(lambda: name in self.names() and self.line(name).mark.text() == mark, f"{name} is {mark}")
@@ -107,14 +113,14 @@ def yellow_pixels(image: QImage) -> int:
 def test_a_day_at_the_window(watch: Watch) -> None:
     for name in ("Motion", "Vision", "Objects", "Battery", "Command"):
         watch.mark_is(name, "fresh")
-    until(lambda: watch.window.plots.all[3].value_text != "no data", "the load of the computer is plotted")
+    until(lambda: watch.plotted("CPU load") != "no data", "the load of the computer is plotted")
     keep_screenshot(watch.window, "healthy")
 
     watch.key(Qt.Key.Key_P)
     watch.preview_is("RUNNING")
     watch.video_moves()
     boxes_are_drawn(watch)
-    until(lambda: watch.window.plots.all[0].value_text.endswith(" fps"), "the video's rate is plotted")
+    until(lambda: watch.plotted("Video rate").endswith(" fps"), "the video's rate is plotted")
     keep_screenshot(watch.window, "preview-running", fills_in_s=8)
 
     watch.robot.sensors.change(silent=["odometry"])
