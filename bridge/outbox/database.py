@@ -1,4 +1,4 @@
-"""The outbox's database: the one home of SQLite. Used by one thread.
+"""The outbox's database file: opened, checked, moved aside when it is damaged. Used by one thread.
 
 It stays within its bytes: the pages that hold data are bounded, and what does not fit is dropped (`append`);
 the WAL is written back every MiB, and no transaction is larger than some hundred KiB.
@@ -11,9 +11,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
+from bridge.outbox import commands, meta
 from bridge.outbox.cursor import Cursor, read_cursor, write_cursor
+from bridge.outbox.items import batch_between, drop_oldest, first_batch, insert
 from bridge.outbox.schema import TABLES, VERSION
 from bridge.values import Batch, DropReason, Event, Gap, Item, OutboxError, Position
 from common.private_files import make_directory
@@ -22,23 +24,13 @@ _log = logging.getLogger(__name__)
 
 NAME: Final = "outbox.db"
 DAMAGED_NAME: Final = "outbox.damaged.db"
-MOST_ITEMS: Final = 64
-"""Of a batch."""
-MOST_BYTES: Final = 256 * 1024
-"""Of a batch, with its envelope."""
 RESERVE_BYTES: Final = 4 * 1024 * 1024
 """For the WAL, and for the pages that a transaction adds before it drops others."""
 MOST_PROBES: Final = 1024
-_ENVELOPE_BYTES: Final = 1024
-_ITEM_BYTES: Final = 64
-"""Of an item besides its payload."""
 _PAGE_BYTES: Final = 4096
 _CHECKPOINT_PAGES: Final = 256
-_MOST_COMMANDS: Final = 1024
-"""Commands that are remembered, so that none is carried out twice."""
 _DAMAGED: Final = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 _SUFFIXES: Final = ("", "-wal", "-journal", "-shm")
-_COLUMNS: Final = "id, run_id, first, last, severity, payload, reason, earlier, probes"
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,14 +110,14 @@ class Database:
         """
         with self._use() as db:
             for item in items:
-                self._insert(db, item)
-                _count(db, "events", isinstance(item, Event))
+                insert(db, item)
+                meta.count(db, "events", isinstance(item, Event))
                 if isinstance(item, Gap) and item.reason is DropReason.DISK:
-                    _count(db, "dropped", item.count)
-            _set(db, "run_id", position.run_id)
-            _set(db, "sequence", position.sequence)
-            _set(db, "lost", 0)
-            while _pages(db) > self._most_pages and self._drop_oldest(db):
+                    meta.count(db, "dropped", item.count)
+            meta.put(db, "run_id", position.run_id)
+            meta.put(db, "sequence", position.sequence)
+            meta.put(db, "lost", 0)
+            while _pages(db) > self._most_pages and drop_oldest(db, self._flight):
                 pass
 
     def drop_oldest(self) -> bool:
@@ -135,7 +127,7 @@ class Database:
             OutboxError: nothing was changed.
         """
         with self._use() as db:
-            return self._drop_oldest(db)
+            return drop_oldest(db, self._flight)
 
     def next_batch(self) -> Batch | None:
         """Returns the batch that is to be sent, the same one until it is delivered; None if there is none.
@@ -146,7 +138,7 @@ class Database:
         with self._use() as db:
             if batch := self._in_flight(db):
                 return batch
-            batch = _batch(db.execute(f"SELECT {_COLUMNS} FROM items ORDER BY id LIMIT ?", (MOST_ITEMS,)))  # noqa: S608
+            batch = first_batch(db)
             if batch is None:
                 return None
             cursor = self._cursor.model_copy(
@@ -189,14 +181,14 @@ class Database:
                 db.execute("DELETE FROM items WHERE id = ? AND first > last", (batch.first_id,))
             else:
                 db.execute("DELETE FROM items WHERE id <= ?", (batch.last_id,))
-                _count(db, "sent", batch.events)
-                _count(db, "events", -batch.events)
+                meta.count(db, "sent", batch.events)
+                meta.count(db, "events", -batch.events)
         self._flight = 0
 
     def is_new(self) -> bool:
         """Returns whether nothing was added since it was made, in the place of one that was lost."""
         with self._use() as db:
-            return bool(_get(db, "lost"))
+            return bool(meta.get(db, "lost"))
 
     def begin_command(self, command_id: str) -> bool:
         """Remembers a command before it is carried out. Returns False if it is known already.
@@ -205,14 +197,7 @@ class Database:
             OutboxError: it must not be carried out.
         """
         with self._use() as db:
-            known = db.execute("SELECT 1 FROM commands WHERE command_id = ?", (command_id,)).fetchone()
-            if known is None:
-                db.execute("INSERT INTO commands (command_id) VALUES (?)", (command_id,))
-                db.execute(
-                    "DELETE FROM commands WHERE sent = 1 AND id <= (SELECT max(id) FROM commands) - ?",
-                    (_MOST_COMMANDS,),
-                )
-            return known is None
+            return commands.begin(db, command_id)
 
     def end_command(self, command_id: str, result: bytes) -> None:
         """Keeps the result of a command until it is sent. A second result of the same command is ignored.
@@ -221,32 +206,22 @@ class Database:
             OutboxError: nothing was changed.
         """
         with self._use() as db:
-            db.execute("INSERT OR IGNORE INTO commands (command_id) VALUES (?)", (command_id,))
-            db.execute(
-                "UPDATE commands SET result = ? WHERE command_id = ? AND result IS NULL", (result, command_id)
-            )
+            commands.end(db, command_id, result)
 
     def unanswered_commands(self) -> list[str]:
         """Returns the commands that have been begun and have no result."""
         with self._use() as db:
-            return [
-                row[0]
-                for row in db.execute("SELECT command_id FROM commands WHERE result IS NULL ORDER BY id")
-            ]
+            return commands.unanswered(db)
 
     def next_result(self) -> tuple[str, bytes] | None:
         """Returns the oldest result that has not been sent, with its command's ID; None if there is none."""
         with self._use() as db:
-            row = db.execute(
-                "SELECT command_id, result FROM commands WHERE result IS NOT NULL AND sent = 0"
-                " ORDER BY id LIMIT 1"
-            ).fetchone()
-            return (str(row[0]), bytes(row[1])) if row else None
+            return commands.next_result(db)
 
     def result_sent(self, command_id: str) -> None:
         """Notes that the hub has the result."""
         with self._use() as db:
-            db.execute("UPDATE commands SET sent = 1 WHERE command_id = ?", (command_id,))
+            commands.result_sent(db, command_id)
 
     def uploads(self) -> list[str]:
         """Returns the rows of the uploads."""
@@ -333,15 +308,15 @@ class Database:
         db.execute("BEGIN IMMEDIATE")
         for statement in TABLES.split(";\n"):
             db.execute(statement)
-        _set(db, "outbox", self._cursor.outbox)
-        _set(db, "lost", 1)
+        meta.put(db, "outbox", self._cursor.outbox)
+        meta.put(db, "lost", 1)
         if cursor and cursor.last_id:
             # Sent under the name of the batch that may have been delivered: refused if it was.
             reason = DropReason.OUTBOX_LOST
             gap = Gap(cursor.run_id, max(cursor.first, 1), cursor.last, reason, earlier=cursor.first == 0)
-            self._insert(db, gap)
-            _set(db, "run_id", cursor.run_id)
-            _set(db, "sequence", cursor.last)
+            insert(db, gap)
+            meta.put(db, "run_id", cursor.run_id)
+            meta.put(db, "sequence", cursor.last)
             self._cursor = cursor.model_copy(
                 update={"outbox": self._cursor.outbox, "first_id": 1, "last_id": 1}
             )
@@ -364,7 +339,7 @@ class Database:
             raise _DamagedError(str(verdict).splitlines()[0])
         if cursor is None:
             raise _DamagedError("its cursor is missing")
-        if _get(db, "outbox") != cursor.outbox:
+        if meta.get(db, "outbox") != cursor.outbox:
             raise _DamagedError("its cursor belongs to another one")
         newest = db.execute(
             "SELECT coalesce(max(seq), 0) FROM sqlite_sequence WHERE name = 'items'"
@@ -374,7 +349,7 @@ class Database:
         # What comes before the cursor was delivered.
         db.execute("DELETE FROM items WHERE id < ?", (cursor.first_id,))
         (events,) = db.execute("SELECT count(*) FROM items WHERE payload IS NOT NULL").fetchone()
-        _set(db, "events", events)
+        meta.put(db, "events", events)
         self._cursor, self._flight = cursor, cursor.last_id
         batch = self._in_flight(db)
         if batch is None:
@@ -391,154 +366,23 @@ class Database:
                 path.rename(aside)
 
     def _in_flight(self, db: sqlite3.Connection) -> Batch | None:
-        return _batch(
-            db.execute(
-                f"SELECT {_COLUMNS} FROM items WHERE id >= ? AND id <= ? ORDER BY id",  # noqa: S608  # constants
-                (self._cursor.first_id, self._flight),
-            )
-        )
-
-    def _insert(self, db: sqlite3.Connection, item: Item) -> None:
-        if isinstance(item, Event):
-            values: tuple[Any, ...] = (
-                item.run_id,
-                item.first,
-                item.last,
-                item.severity,
-                item.payload,
-                0,
-                0,
-                0,
-            )
-        else:
-            flags = (int(item.reason), int(item.earlier), item.probes)
-            values = (item.run_id, item.first, item.last, item.worst, None, *flags)
-        db.execute(
-            "INSERT INTO items (run_id, first, last, severity, payload, reason, earlier, probes)"
-            " VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
-            values,
-        )
-
-    def _drop_oldest(self, db: sqlite3.Connection) -> bool:
-        """Puts a gap in the place of the oldest INFO, else of the oldest event; else joins old gaps."""
-        for query in (
-            "SELECT id FROM items WHERE payload IS NOT NULL AND severity <= 1 AND id > ? ORDER BY id LIMIT 1",
-            "SELECT id FROM items WHERE payload IS NOT NULL AND id > ? ORDER BY id LIMIT 1",
-        ):
-            if row := db.execute(query, (self._flight,)).fetchone():
-                self._turn_into_gap(db, row[0])
-                return True
-        return self._join_oldest_gaps(db)
-
-    def _turn_into_gap(self, db: sqlite3.Connection, row_id: int) -> None:
-        db.execute(
-            "UPDATE items SET payload = NULL, reason = ? WHERE id = ?", (int(DropReason.OUTBOX_FULL), row_id)
-        )
-        _count(db, "dropped", 1)
-        _count(db, "events", -1)
-        here = _row(db, "id = ?", row_id)
-        before = _row(db, "id < ? ORDER BY id DESC LIMIT 1", row_id)
-        if here and before and before[0] > self._flight and _adjoin(before, here):
-            here = _join(db, before, here)
-        if here and (after := _row(db, "id > ? ORDER BY id LIMIT 1", here[0])) and _adjoin(here, after):
-            _join(db, here, after)
-
-    def _join_oldest_gaps(self, db: sqlite3.Connection) -> bool:
-        """Joins the two oldest gaps; one of an earlier run goes, because the next run's says so."""
-        here = _row(db, "id > ? ORDER BY id LIMIT 1", self._flight)
-        after = here and _row(db, "id > ? ORDER BY id LIMIT 1", here[0])
-        if not here or not after:
-            return False
-        if here[1].run_id == after[1].run_id:
-            _join(db, here, after)
-        else:
-            db.execute("DELETE FROM items WHERE id = ?", (here[0],))
-            db.execute("UPDATE items SET earlier = 1 WHERE id = ?", (after[0],))
-        return True
+        return batch_between(db, self._cursor.first_id, self._flight)
 
     def _read_facts(self, db: sqlite3.Connection) -> Facts:
-        run_id = _get(db, "run_id")
+        run_id = meta.get(db, "run_id")
         return Facts(
-            events=_get(db, "events") or 0,
+            events=meta.get(db, "events") or 0,
             size=_pages(db) * _PAGE_BYTES,
-            sent=_get(db, "sent") or 0,
-            dropped=_get(db, "dropped") or 0,
-            position=None if run_id is None else Position(run_id, _get(db, "sequence")),
+            sent=meta.get(db, "sent") or 0,
+            dropped=meta.get(db, "dropped") or 0,
+            position=None if run_id is None else Position(run_id, meta.get(db, "sequence")),
         )
-
-
-_NumberedGap = tuple[int, Gap]
-
-
-def _batch(rows: "sqlite3.Cursor") -> Batch | None:
-    items: list[Item] = []
-    ids: list[int] = []
-    size = _ENVELOPE_BYTES
-    for row in rows:
-        item = _item(row)
-        if items and not _follows(items[-1], item):
-            break
-        size += _ITEM_BYTES + (len(item.payload) if isinstance(item, Event) else 0)
-        if items and size > MOST_BYTES:
-            break
-        items.append(item)
-        ids.append(row[0])
-    return Batch(tuple(items), ids[0], ids[-1]) if items else None
-
-
-def _follows(before: Item, item: Item) -> bool:
-    first_of_run = isinstance(item, Gap) and item.earlier
-    return item.run_id == before.run_id and item.first == before.last + 1 and not first_of_run
-
-
-def _item(row: Any) -> Item:
-    _, run_id, first, last, severity, payload, reason, earlier, probes = row
-    if payload is not None:
-        return Event(run_id, first, severity, payload)
-    return Gap(run_id, first, last, DropReason(reason), severity, bool(earlier), probes)
-
-
-def _row(db: sqlite3.Connection, where: str, value: int) -> _NumberedGap | None:
-    """Returns a gap with its number; None if the row is an event, or there is none."""
-    row = db.execute(f"SELECT {_COLUMNS} FROM items WHERE {where}", (value,)).fetchone()  # noqa: S608  # constants
-    item = _item(row) if row else None
-    return (row[0], item) if isinstance(item, Gap) else None
-
-
-def _adjoin(before: _NumberedGap, after: _NumberedGap) -> bool:
-    return before[1].reason is after[1].reason is DropReason.OUTBOX_FULL and _follows(before[1], after[1])
-
-
-def _join(db: sqlite3.Connection, before: _NumberedGap, after: _NumberedGap) -> _NumberedGap:
-    """Makes one gap of two. Its severity is known if both are."""
-    (row_id, first), (other_id, second) = before, after
-    worst = max(first.worst, second.worst) if first.worst and second.worst else 0
-    db.execute("DELETE FROM items WHERE id = ?", (other_id,))
-    db.execute(
-        "UPDATE items SET last = ?, severity = ?, reason = ?, probes = 0 WHERE id = ?",
-        (second.last, worst, int(second.reason), row_id),
-    )
-    return row_id, Gap(first.run_id, first.first, second.last, second.reason, worst, first.earlier)
 
 
 def _pages(db: sqlite3.Connection) -> int:
     """Returns the pages with data, also of the present transaction."""
     (pages,), (free,) = (db.execute(f"PRAGMA {each}").fetchone() for each in ("page_count", "freelist_count"))
     return int(pages) - int(free)
-
-
-def _get(db: sqlite3.Connection, key: str) -> Any:
-    row = db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
-    return row[0] if row else None
-
-
-def _count(db: sqlite3.Connection, key: str, more: int) -> None:
-    if more:
-        _set(db, key, (_get(db, key) or 0) + more)
-
-
-def _set(db: sqlite3.Connection, key: str, value: str | int) -> None:
-    db.execute("INSERT OR REPLACE INTO meta VALUES (?, ?)", (key, value))
 
 
 def _code(error: sqlite3.Error) -> int:

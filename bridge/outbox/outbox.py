@@ -5,8 +5,9 @@ import logging
 from collections.abc import AsyncIterator, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from bridge.outbox.database import Database, Facts
 from bridge.values import Batch, Item, OutboxError, Position
@@ -51,7 +52,7 @@ class Outbox:
 
     async def append(self, items: Sequence[Item], position: Position) -> None:
         """Adds items; see `Database.append`."""
-        await self._call(lambda: self._database.append(items, position))
+        await self._call(self._database.append, items, position)
 
     async def next_batch(self) -> Batch | None:
         """Returns what is to be sent; see `Database.next_batch`."""
@@ -59,15 +60,15 @@ class Outbox:
 
     async def delivered(self, batch: Batch, *, repeated: bool) -> None:
         """Deletes a batch; see `Database.delivered`."""
-        await self._call(lambda: self._database.delivered(batch, repeated=repeated))
+        await self._call(partial(self._database.delivered, batch, repeated=repeated))
 
     async def begin_command(self, command_id: str) -> bool:
         """Remembers a command; False if it is known."""
-        return await self._call(lambda: self._database.begin_command(command_id))
+        return await self._call(self._database.begin_command, command_id)
 
     async def end_command(self, command_id: str, result: bytes) -> None:
         """Keeps a command's result until it is sent."""
-        await self._call(lambda: self._database.end_command(command_id, result))
+        await self._call(self._database.end_command, command_id, result)
         self.results += 1
         self.changes.notify_all()
 
@@ -81,7 +82,7 @@ class Outbox:
 
     async def result_sent(self, command_id: str) -> None:
         """Notes that the hub has a result."""
-        await self._call(lambda: self._database.result_sent(command_id))
+        await self._call(self._database.result_sent, command_id)
 
     async def upload_rows(self) -> list[str]:
         """Returns the rows of the uploads."""
@@ -89,21 +90,21 @@ class Outbox:
 
     async def put_upload_row(self, recording_id: str, row: str) -> None:
         """Writes an upload's row."""
-        await self._call(lambda: self._database.put_upload(recording_id, row))
+        await self._call(self._database.put_upload, recording_id, row)
 
     async def delete_upload_row(self, recording_id: str) -> None:
         """Deletes an upload's row."""
-        await self._call(lambda: self._database.delete_upload(recording_id))
+        await self._call(self._database.delete_upload, recording_id)
 
     async def close(self) -> None:
         """Closes the database and ends the thread."""
         await asyncio.get_running_loop().run_in_executor(self._thread, self._database.close)
         self._thread.shutdown(wait=False)
 
-    async def _call(self, work: Callable[[], ResultT]) -> ResultT:
+    async def _call(self, work: Callable[..., ResultT], *arguments: Any) -> ResultT:
         before = self.error, self.facts
         try:
-            result = await asyncio.get_running_loop().run_in_executor(self._thread, work)
+            result = await asyncio.get_running_loop().run_in_executor(self._thread, work, *arguments)
         except OutboxError as error:
             self.refusals += 1
             if self.error != str(error):

@@ -9,7 +9,8 @@ from typing import Final
 
 from bridge.config import GatewaySettings
 from bridge.jittered_backoff import JitteredBackoff
-from bridge.outbox.database import MOST_BYTES, MOST_ITEMS, MOST_PROBES
+from bridge.outbox.database import MOST_PROBES
+from bridge.outbox.items import MOST_BYTES, MOST_ITEMS
 from bridge.outbox.outbox import Outbox
 from bridge.robot.feed import Feed, FeedError
 from bridge.robot.gateway import EVENTS_SILENT_S, events, explained
