@@ -83,7 +83,8 @@ class ViewerLimit:
 
     def _has_room_for(self, host: str) -> bool:
         """Returns whether one more caller of this host may begin a handshake."""
-        pending = [each.host for each in self._pending.values()]
+        # A request that a viewer repeats may arrive after it has connected: it is counted among the viewers.
+        pending = [each.host for address, each in self._pending.items() if address not in self._viewers]
         of_known = sum(each in self._known_hosts for each in pending)
         if len(self._viewers) + of_known >= self._limit or pending.count(host) >= HANDSHAKES_OF_HOST:
             return False
@@ -102,6 +103,7 @@ class ViewerLimit:
     def _remove(self, address: str) -> None:
         with self._lock:
             self._viewers.discard(address)
+            self._pending.pop(address, None)
 
 
 def address_of(socket_address: Any) -> str:

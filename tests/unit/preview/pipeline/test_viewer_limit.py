@@ -73,6 +73,17 @@ def test_viewers_beyond_the_limit_are_refused_and_counted(listener: Listener) ->
     assert listener.joins("10.0.0.9")
 
 
+def test_a_request_that_arrives_once_more_after_its_viewer_has_connected_takes_no_place(
+    listener: Listener,
+) -> None:
+    for number in range(LIMIT):
+        assert listener.joins(f"10.0.0.{number}")
+        assert listener.calls(f"10.0.0.{number}")
+    listener.leaves("10.0.0.1")
+    assert listener.joins("10.0.0.9")
+    assert not listener.joins("10.0.0.8")
+
+
 def test_one_host_without_the_passphrase_keeps_no_viewer_out(listener: Listener) -> None:
     """It begins handshakes from all ports it has, again and again."""
     for second in range(20):
