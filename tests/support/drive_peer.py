@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from omniseer.drive.v1 import drive_pb2 as pb
+from tests.support.waiting import wait_until
 
 _PERIOD_NS: Final = 20_000_000
 _VALID_NS: Final = 250_000_000
@@ -170,9 +171,20 @@ class _Peer:
         self.received_ns = pb.FromDrive.FromString(packet).actual.monotonic_ns or self.received_ns
 
 
-def main() -> None:
+def connected(path: str) -> socket.socket | None:
+    """A connection to the drive program; None while nothing listens."""
     link = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    link.connect(sys.argv[1])
+    try:
+        link.connect(path)
+    except OSError:
+        link.close()
+        return None
+    return link
+
+
+def main() -> None:
+    # A worker that was lost is followed by another one, which does not listen at once.
+    link = wait_until(lambda: connected(sys.argv[1]), "a worker listens")
     path = Path(sys.argv[2])
     held_log = path.with_suffix(".held").open("ab", buffering=0)
     peer = _Peer(link, Instants(path), held_log)

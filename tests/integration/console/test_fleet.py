@@ -202,13 +202,22 @@ def test_only_new_events_are_followed_each_once_and_in_order(hub: FleetHub) -> N
     assert seen == list(range(seen[0], last + 2))
 
 
-def test_new_events_of_a_robot_without_any(hub: FleetHub) -> None:
+def test_new_events_of_a_robot_without_any(hub: FleetHub, monkeypatch: pytest.MonkeyPatch) -> None:
     hub.put_events(batch("lab1", event(1)))
 
     async def first(connection: Hub) -> FleetItem:
+        asked, last = asyncio.Event(), connection.last
+
+        async def noted(stream: str, subjects: str) -> Any:
+            found = await last(stream, subjects)
+            asked.set()
+            return found
+
+        monkeypatch.setattr(connection, "last", noted)
         items = read_events(connection, EventQuery("lab2", None, follow=True))
         coming = asyncio.ensure_future(anext(items))
-        # Whenever it begins: of this robot the hub had nothing.
+        # What counts as new is what the hub takes after this answer, whenever its consumer is made.
+        await asked.wait()
         await asyncio.to_thread(hub.put_events, batch("lab1", event(2)), batch("lab2", event(1)))
         return await asyncio.wait_for(coming, ENDS_WITHIN_S)
 
