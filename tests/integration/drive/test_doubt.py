@@ -118,9 +118,7 @@ def test_a_recorder_of_our_own_is_no_base(tmp_path: Path, ros_domain: int) -> No
         robot.drive()
         robot.robot.process.terminate()
         robot.robot.process.wait(10)
-        later_ns = time.monotonic_ns() + 1_500_000_000
-        wait_until(lambda: robot.state().monotonic_ns > later_ns, "several looks at the graph")
-        assert pb.INHIBIT_BASE_ABSENT in robot.state().inhibits
+        wait_until(lambda: pb.INHIBIT_BASE_ABSENT in robot.state().inhibits, "the base is missed")
         assert list(robot.state().problems) == ["nothing takes the velocities on /cmd_vel_keyboard"]
 
 
