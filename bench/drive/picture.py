@@ -6,8 +6,7 @@ viewer are on one machine, so that capture times and what the base notes are of 
 
 import asyncio
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
-from contextlib import asynccontextmanager, contextmanager
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,45 +15,18 @@ from typing import Final
 from bench.drive.ground import Ground
 from bench.progress import log
 from bench.rows import FEWEST_ROUNDS, Row
-from console.client import AsyncGatewayClient, DriveOptions, DriveSession, PreviewProfile, PreviewState
-from console.receiver.frame import Frame, PixelFormat
-from console.viewer.robot_video import RobotVideo
-from tests.support.driven_robot import DrivenRobot, available, gateway_for, in_motion
-from tests.support.eventually import eventually
+from console.client import AsyncGatewayClient, DriveSession
+from tests.support.driven_robot import DrivenRobot, gateway_for, in_motion
+from tests.support.driver_view import Viewer, by_picture, young_picture
 from tests.support.running_preview import RunningPreview
 from tests.support.stalling_camera import StallingCamera
 
 ROUNDS: Final = FEWEST_ROUNDS
 SPEED_MPS: Final = 0.2
 PROMISED_MS: Final = 650
-YOUNG_MS: Final = 300
 LONGER_S: Final = 1.0
 """Longer than any motion may last after a fault."""
-_PATIENCE_S: Final = 30.0
 _HOLD_EVERY_S: Final = 0.02
-_CLOSE_WITHIN_S: Final = 10.0
-
-
-class Viewer:
-    """The project's viewer, whose screen can freeze.
-
-    Args:
-        target: the gateway's address.
-
-    Attributes:
-        shown_ns: capture of the newest picture that was ever shown.
-    """
-
-    def __init__(self, target: str) -> None:
-        self.video = RobotVideo(target, pixels=PixelFormat.I420)
-        self.video.session.add_frame_listener(self._show)
-        self.frozen = False
-        self.shown_ns = 0
-
-    def _show(self, frame: Frame) -> None:
-        if not self.frozen:
-            self.video.meter.shown(frame)
-            self.shown_ns = max(self.shown_ns, frame.capture_ns or 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,12 +98,10 @@ def stopped_ms(ground: Ground, fault: str) -> float:
 async def _stopped_s(
     camera: StallingCamera, robot: DrivenRobot, happens: Callable[[Scene], Awaitable[None]]
 ) -> float:
-    async with _shown(camera, robot) as scene:
-        by_picture = DriveOptions(picture=scene.viewer.video.meter.capture_ns)
-        async with scene.client.drive(by_picture) as session:
-            await in_motion(session, robot.base, SPEED_MPS)
-            await asyncio.gather(happens(scene), _hold(session))
-            return robot.base.stopped_after_s(scene.viewer.shown_ns / 1e9)
+    async with young_picture(robot) as (client, viewer), client.drive(by_picture(viewer)) as session:
+        await in_motion(session, robot.base, SPEED_MPS)
+        await asyncio.gather(happens(Scene(camera, robot, client, viewer)), _hold(session))
+        return robot.base.stopped_after_s(viewer.shown_ns / 1e9)
 
 
 async def _hold(session: DriveSession) -> None:
@@ -140,31 +110,3 @@ async def _hold(session: DriveSession) -> None:
     while time.monotonic() < until_s:
         session.hold(SPEED_MPS)
         await asyncio.sleep(_HOLD_EVERY_S)
-
-
-@asynccontextmanager
-async def _shown(camera: StallingCamera, robot: DrivenRobot) -> AsyncIterator[Scene]:
-    """A viewer that shows the robot's picture; no stop is latched."""
-    with _viewing(robot.target) as viewer:
-        async with available(robot) as client:
-
-            async def runs() -> bool:
-                return (await client.status()).preview.state is PreviewState.RUNNING
-
-            async def age_ms() -> float:
-                return viewer.video.meter.reading().age_ms or float("inf")
-
-            await client.enable_preview(PreviewProfile.BALANCED)
-            await eventually(runs, bool, "the preview runs", _PATIENCE_S)
-            await eventually(age_ms, lambda it: it < YOUNG_MS, "a young picture", _PATIENCE_S)
-            yield Scene(camera, robot, client, viewer)
-
-
-@contextmanager
-def _viewing(target: str) -> Iterator[Viewer]:
-    viewer = Viewer(target)
-    viewer.video.start()
-    try:
-        yield viewer
-    finally:
-        viewer.video.close(_CLOSE_WITHIN_S)

@@ -22,6 +22,7 @@ from recorder.mcap.rosbag2 import FILE_NAME, metadata
 from recorder.mcap.writer import SegmentWriter
 from recorder.values import Ended, Loss, Sample
 from tests.integration.recorder.conftest import Everything, Taken
+from tests.support.helper import first_line, helper
 from tests.support.talker import Talker, talking
 from tests.support.waiting import wait_until
 
@@ -172,20 +173,13 @@ def test_only_what_is_wanted_is_subscribed(talker: Talker, taken: Taken) -> None
 
 
 def test_a_peer_whose_name_is_not_text_costs_the_others_nothing(talker: Talker, taken: Taken) -> None:
-    command = [sys.executable, "-m", "tests.support.undecodable_peer", "/theirs"]
-    with subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT
-    ) as peer:
-        assert peer.stdout
-        assert "ready" in peer.stdout.readline()
+    with helper("tests.support.undecodable_peer", "/theirs") as peer:
+        assert first_line(peer) == "ready\n"
         publisher = talker.publisher("/odom", Odometry)
         subscribed(publisher)
         publisher.publish(Odometry())
         wait_until(lambda: taken.samples("/odom"), "a message")
         wait_until(lambda: taken.samples("/theirs"), "a message of the peer itself")
-        assert peer.stdin
-        peer.stdin.close()
-        peer.wait(10)
 
 
 @pytest.mark.parametrize(
@@ -256,12 +250,8 @@ def test_losses_are_told_when_the_intake_has_caught_up(
 
 
 def test_how_many_are_lost_is_unknown_while_the_publishers_are(talker: Talker, taken: Taken) -> None:
-    command = [sys.executable, "-m", "tests.support.undecodable_peer", "/theirs"]
-    with subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT
-    ) as peer:
-        assert peer.stdout
-        assert "ready" in peer.stdout.readline()
+    with helper("tests.support.undecodable_peer", "/theirs") as peer:
+        assert first_line(peer) == "ready\n"
         publisher = talker.publisher("/theirs", Odometry)
         subscribed(publisher)
         wait_until(lambda: taken.samples("/theirs"), "a message of the peer")
@@ -273,9 +263,6 @@ def test_how_many_are_lost_is_unknown_while_the_publishers_are(talker: Talker, t
 
         wait_until(told, "a loss")
         assert {each.messages for each in told()} == {None}
-        assert peer.stdin
-        peer.stdin.close()
-        peer.wait(10)
 
 
 def taken_and_lost(taken: Taken, hz: int, size: int, count: int) -> tuple[int, int]:

@@ -7,7 +7,7 @@ on one machine, so that capture times and what the subscriber notes are of one c
 import asyncio
 import time
 from collections.abc import AsyncIterator, Iterator
-from contextlib import ExitStack, asynccontextmanager, contextmanager
+from contextlib import ExitStack, asynccontextmanager
 from dataclasses import dataclass
 
 import pytest
@@ -18,11 +18,9 @@ from console.client import (
     DriveOptions,
     DriveSession,
     PreviewProfile,
-    PreviewState,
 )
-from console.receiver.frame import Frame, PixelFormat
-from console.viewer.robot_video import RobotVideo
-from tests.support.driven_robot import DrivenRobot, available, driven_robot, in_motion, is_at_rest
+from tests.support.driven_robot import DrivenRobot, driven_robot, in_motion, is_at_rest
+from tests.support.driver_view import Viewer, by_picture, young_picture
 from tests.support.eventually import eventually
 from tests.support.promise import keeps_async
 from tests.support.running_preview import RunningPreview
@@ -39,28 +37,6 @@ TICK_S = 0.02
 HOLDS_S = 2.0
 LONGER_S = 1.0
 """Longer than any motion may last after a fault."""
-
-
-class Viewer:
-    """The project's viewer, whose screen can freeze.
-
-    Args:
-        target: the gateway's address.
-
-    Attributes:
-        shown_ns: capture of the newest picture that was ever shown.
-    """
-
-    def __init__(self, target: str) -> None:
-        self.video = RobotVideo(target, pixels=PixelFormat.I420)
-        self.video.session.add_frame_listener(self._show)
-        self.frozen = False
-        self.shown_ns = 0
-
-    def _show(self, frame: Frame) -> None:
-        if not self.frozen:
-            self.video.meter.shown(frame)
-            self.shown_ns = max(self.shown_ns, frame.capture_ns or 0)
 
 
 @dataclass
@@ -91,40 +67,15 @@ def scene(module_ros_domain: int, tmp_path_factory: pytest.TempPathFactory) -> I
         yield Scene(camera, robot)
 
 
-@contextmanager
-def viewing(target: str) -> Iterator[Viewer]:
-    viewer = Viewer(target)
-    viewer.video.start()
-    try:
-        yield viewer
-    finally:
-        viewer.video.close(10)
-
-
 @asynccontextmanager
 async def seen(
     scene: Scene, profile: PreviewProfile = PreviewProfile.BALANCED
 ) -> AsyncIterator[tuple[AsyncGatewayClient, Viewer]]:
     """A client and a viewer that shows the robot's picture; no stop is latched."""
     scene.camera.go_on()
-    with viewing(scene.robot.target) as viewer, scene.robot.drive.explaining():
-        async with available(scene.robot) as client:
-            await client.enable_preview(profile)
-            await eventually(lambda: running(client), bool, "the preview runs", PATIENCE_S)
-            await eventually(lambda: age_ms(viewer), lambda it: it < 300, "a young picture", PATIENCE_S)
-            yield client, viewer
-
-
-def by_picture(viewer: Viewer) -> DriveOptions:
-    return DriveOptions(picture=viewer.video.meter.capture_ns)
-
-
-async def running(client: AsyncGatewayClient) -> bool:
-    return (await client.status()).preview.state is PreviewState.RUNNING
-
-
-async def age_ms(viewer: Viewer) -> float:
-    return viewer.video.meter.reading().age_ms or float("inf")
+    with scene.robot.drive.explaining():
+        async with young_picture(scene.robot, profile) as client_and_viewer:
+            yield client_and_viewer
 
 
 async def held(session: DriveSession, for_s: float) -> set[DriveInhibit]:

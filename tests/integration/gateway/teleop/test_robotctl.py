@@ -4,6 +4,8 @@ import json
 import signal
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import pytest
 
@@ -157,14 +159,20 @@ def test_space_stops_and_the_stop_is_reset_by_its_number(robot: DrivenRobot) -> 
         assert screen.process.wait(20) == 0
 
 
-def test_a_gamepad_drives_while_its_shoulder_is_held_until_it_is_unplugged(robot: DrivenRobot) -> None:
+@contextmanager
+def with_a_gamepad(robot: DrivenRobot, columns: int = 160) -> Iterator[Terminal]:
+    """Robotctl drive with a gamepad in the test's hands, at a terminal that does not report releases."""
     words = ["drive", "--input", "gamepad", "--target", robot.target]
-    with terminal_with(
-        [sys.executable, "-m", "tests.support.padded_robotctl", *words], columns=160
-    ) as screen:
+    program = [sys.executable, "-m", "tests.support.padded_robotctl", *words]
+    with terminal_with(program, columns=columns) as screen:
         screen.wait_for("\x1b[?u")
         screen.press(PLAIN_ANSWER)
         screen.wait_for("hold a shoulder button of")
+        yield screen
+
+
+def test_a_gamepad_drives_while_its_shoulder_is_held_until_it_is_unplugged(robot: DrivenRobot) -> None:
+    with with_a_gamepad(robot) as screen:
         screen.press("w")
         screen.process.send_signal(signal.SIGUSR1)
         wait_until(lambda: robot.base.moves, "the base moves")
@@ -180,13 +188,7 @@ def test_a_gamepad_drives_while_its_shoulder_is_held_until_it_is_unplugged(robot
 
 def test_a_gamepad_without_a_cable_that_reports_nothing_new_is_released(robot: DrivenRobot) -> None:
     """As one out of range: the computer keeps its last values for seconds."""
-    words = ["drive", "--input", "gamepad", "--target", robot.target]
-    with terminal_with(
-        [sys.executable, "-m", "tests.support.padded_robotctl", *words], columns=260
-    ) as screen:
-        screen.wait_for("\x1b[?u")
-        screen.press(PLAIN_ANSWER)
-        screen.wait_for("hold a shoulder button of")
+    with with_a_gamepad(robot, columns=260) as screen:
         screen.process.send_signal(signal.SIGUSR1)
         held_s = time.monotonic()
         wait_until(lambda: robot.base.moves, "the base moves")
@@ -202,13 +204,7 @@ def test_a_gamepad_without_a_cable_that_reports_nothing_new_is_released(robot: D
 
 
 def test_a_terminal_that_loses_the_focus_releases_the_gamepad_as_well(robot: DrivenRobot) -> None:
-    words = ["drive", "--input", "gamepad", "--target", robot.target]
-    with terminal_with(
-        [sys.executable, "-m", "tests.support.padded_robotctl", *words], columns=160
-    ) as screen:
-        screen.wait_for("\x1b[?u")
-        screen.press(PLAIN_ANSWER)
-        screen.wait_for("hold a shoulder button of")
+    with with_a_gamepad(robot) as screen:
         screen.process.send_signal(signal.SIGUSR1)
         wait_until(lambda: robot.base.moves, "the base moves")
         screen.press("\x1b[O")
