@@ -5,8 +5,8 @@ from typing import Final
 
 REMARKS: Final[Mapping[tuple[str, ...], str]] = {
     ("ros.flat",): (
-        "Fast DDS needs about 10 microseconds for each message that arrives, in its own threads, whether or"
-        " not anybody takes it. That grows with the rate; the thread that samples needs the same at any."
+        "Fast DDS needs about 10 microseconds for each message that arrives, in its own threads, taken or"
+        " not. That grows with the rate; the thread that samples needs the same at any."
     ),
     ("watch.p99_healthy", "status.p99"): (
         "callers and gateway share the cores of one machine. Where other programs take these, both rows rise"

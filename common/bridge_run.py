@@ -1,4 +1,4 @@
-"""How the gateway recognises the bridge among its callers: by the run that the bridge has told it of.
+"""How the gateway recognises the bridge among its callers: by the run that the bridge has reported.
 
 The bridge is an ordinary caller with a viewer's credential, and reports the ID of its run over a socket that
 is the robot's own. It sends the same ID with its calls. That earns it a place for its copies, no permission.

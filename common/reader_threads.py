@@ -99,4 +99,4 @@ async def _ended(job: "Future[_T]") -> None:
             await asyncio.wait({result})
         except asyncio.CancelledError:
             continue
-    result.exception()  # nobody is left to be told
+    result.exception()  # no caller is left to get it

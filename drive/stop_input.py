@@ -61,7 +61,7 @@ class StopInput:
         self.problem = ""
         if several:
             self.problem = (
-                f"{len(self._publishers)} publishers on {self.topic}: which of them releases can't be told, "
+                f"{len(self._publishers)} publishers on {self.topic}: which of them releases is unknown, "
                 "so it counts as pressed; give each a topic of its own in stop_topics"
             )
         elif silent:

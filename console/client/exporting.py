@@ -319,7 +319,7 @@ async def once_read(
         recording: With its files.
         ask: Returns it anew.
         sleep: Pauses.
-        options: `progress` is told what is being waited for.
+        options: `progress` gets what is being waited for.
 
     Raises:
         GatewayError: The robot refuses, or no longer answers.

@@ -169,7 +169,7 @@ class VideoView(QWidget):
     def _can_be_seen(self) -> bool:
         """Whether anything of the widget is on a screen: not while its window is minimised or hidden.
 
-        A window system need not tell that a window is covered by others.
+        A window system need not report that a window is covered by others.
         """
         window = self.window()
         handle = window.windowHandle()

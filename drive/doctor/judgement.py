@@ -145,7 +145,7 @@ def _stop_topic(topic: TopicFacts) -> Finding:
         return wrong(
             check,
             f"{', '.join(topic.publishers)} all publish the robot's own stop on {topic.name}",
-            "Which of them releases can't be told: it counts as pressed, no one can drive (ROBOT_STOP)",
+            "Which of them releases is unknown: it counts as pressed, no one can drive (ROBOT_STOP)",
             "Give each a topic of its own, and list them all in stop_topics",
         )
     if topic.publishers:

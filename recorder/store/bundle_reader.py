@@ -119,7 +119,7 @@ class BundleReader:
             except UnreadableError:
                 continue  # It has no sum.
             except TooMuchError:
-                return  # Others read too much at present; whoever asks again goes on.
+                return  # Others read too much at present; the next request goes on.
 
 
 def _state_of(bundle: Bundle, file: BundleFile) -> FileState:

@@ -1,6 +1,6 @@
 """Deleting a recording in two steps, so that a crash in between leaves none that is there by half.
 
-It needs no room: a full disk is what it is for. That a deletion has begun is told by the manifest's new name.
+It needs no room: a full disk is what it is for. The manifest's new name says that a deletion has begun.
 """
 
 import re

@@ -42,7 +42,7 @@ class _Begun:
 class Sums:
     """The sums of files; used on one event loop.
 
-    Reading stops when nobody waits for the sum any more; the next who asks goes on where it stopped.
+    Reading stops when no one waits for the sum any more; the next request goes on where it stopped.
 
     Args:
         threads: that read.

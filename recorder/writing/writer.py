@@ -132,7 +132,7 @@ class Writer:
         try:
             self._work()
         finally:
-            # Whoever waits would do so for ever.
+            # A caller that waits would do so for ever.
             with self._submitting:
                 self._ended = True
             for job in self._jobs:

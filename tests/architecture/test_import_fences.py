@@ -363,7 +363,7 @@ def test_the_fence_sees_what_it_should() -> None:
 
 
 def test_our_programs_take_the_names_of_their_nodes_from_one_list() -> None:
-    """By it the drive program tells an observer from a base."""
+    """By it the drive program distinguishes an observer from a base."""
     calls = {
         ast.unparse(node.args[0])
         for program in PROGRAMS

@@ -21,7 +21,7 @@ REPORTED: Final = 10
 REPORTED_EVERY_S: Final = 60.0
 """After them one each minute, with the number of the others: they displace no other event soon."""
 MAX_CALLERS: Final = 64
-"""That are told apart; new ones beyond them share the reports of one."""
+"""That are kept apart; new ones beyond them share the reports of one."""
 _COMPONENT: Final = "gateway"
 _OTHERS: Final = ""
 

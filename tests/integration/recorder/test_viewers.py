@@ -1,4 +1,4 @@
-"""What viewers have the recorder read keeps nobody else waiting: neither what records, nor other readers."""
+"""What the recorder reads for viewers keeps no one else waiting: neither what records, nor other readers."""
 
 import asyncio
 import hashlib
