@@ -15,10 +15,7 @@ def gauge(name: str, what: str, value: float) -> Metric:
 
 def gauges(name: str, what: str, label: str, values: Mapping[str, float]) -> Metric:
     """Returns a gauge with a value for each value of its label."""
-    family = GaugeMetricFamily(f"{PREFIX}_{name}", what, labels=(label,))
-    for labelled, value in values.items():
-        family.add_metric((labelled,), value)
-    return family
+    return _filled(GaugeMetricFamily(f"{PREFIX}_{name}", what, labels=(label,)), values)
 
 
 def info(name: str, what: str, /, **labels: str) -> Metric:
@@ -35,7 +32,12 @@ def counter(name: str, what: str, value: float) -> Metric:
 
 def counters(name: str, what: str, label: str, values: Mapping[str, float]) -> Metric:
     """Returns a counter with a value for each value of its label."""
-    family = CounterMetricFamily(f"{PREFIX}_{name}", what, labels=(label,))
+    return _filled(CounterMetricFamily(f"{PREFIX}_{name}", what, labels=(label,)), values)
+
+
+def _filled(
+    family: GaugeMetricFamily | CounterMetricFamily, values: Mapping[str, float]
+) -> GaugeMetricFamily | CounterMetricFamily:
     for labelled, value in values.items():
         family.add_metric((labelled,), value)
     return family
