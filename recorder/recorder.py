@@ -179,8 +179,7 @@ class Recorder:
 
     async def _tick(self) -> None:
         now_s = self._loop.time()
-        if not self._parts.writer.alive:
-            raise RuntimeError("the writer has ended by a defect; see above")
+        self._check_writer()
         await self.take_reports()
         if self._lifecycle.retry_due:
             await (self._retry() if self._lifecycle.state is State.FAULTED else self._retry_ring())
@@ -193,6 +192,10 @@ class Recorder:
         if now_s >= self._room_at_s:
             self._room_at_s = now_s + _ROOM_EVERY_S
             await self._keep_room()
+
+    def _check_writer(self) -> None:
+        if not self._parts.writer.alive:
+            raise RuntimeError("the writer has ended by a defect; see above")
 
     def _notify(self) -> None:
         """Wakes the watchers if there is something new, also from other threads and the sources."""
@@ -211,6 +214,8 @@ class Recorder:
             await self._ring.close()
             await self.take_reports()
         self._parts.sources.want(frozenset(), video=False)
+        # It may have ended after the last tick, and while nothing was recorded any more.
+        self._check_writer()
 
     # --- the disk ---
 

@@ -114,8 +114,8 @@ class Writer:
 
     @property
     def alive(self) -> bool:
-        """Whether the thread runs; a defect ends it."""
-        return self._thread.is_alive()
+        """Whether jobs are done; a defect ends that, and the thread as soon as it has cleaned up."""
+        return not self._ended
 
     def _submit(self, work: Callable[[], _T]) -> "Future[_T]":
         """Queues something for the thread; the future fails with its OSError, or with WriterEndedError."""

@@ -37,19 +37,28 @@ async def test_a_message_with_a_time_that_is_none_is_recorded(tmp_path: Path, pu
 async def test_a_defect_of_the_writer_ends_the_recorder_and_leaves_no_operation_waiting(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Also where the recorder is stopped while the writer's thread still cleans up."""
+    cleaned_up, abandon = threading.Event(), Output.abandon
+
     def broken(_output: Output, _item: Item) -> None:
         raise ValueError("a defect")
+
+    def slow(output: Output) -> None:
+        cleaned_up.wait(1.0)
+        abandon(output)
 
     async def record() -> None:
         async with running_recorder(tmp_path) as running:
             await running.operations.start("1", StartOptions())
             monkeypatch.setattr(Output, "write", broken)
+            monkeypatch.setattr(Output, "abandon", slow)
             Source(running.queue).send()
             with pytest.raises(WriterEndedError):
                 await asyncio.wait_for(running.operations.stop("2", ""), WITHIN_S)
 
     with pytest.raises(RuntimeError, match="the writer has ended"):
         await record()
+    cleaned_up.set()
 
 
 async def test_what_has_waited_is_flushed_in_between(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
