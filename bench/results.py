@@ -17,8 +17,8 @@ ROOT: Final = Path(__file__).parent.parent
 RESULTS: Final = ROOT / "docs" / "benchmarks.json"
 CHANGED: Final = "+changes"
 """Behind the commit of a checkout that has uncommitted changes."""
-_OTHER_FILES: Final = ("--", ".", ":!docs/benchmarks.json", ":!docs/benchmarks.md")
-"""Paths for git: to publish, and to commit what was published, changes nothing that is measured."""
+_OTHER_FILES: Final = ("--", ".", *(f":!{path}" for path in ("docs", "*.md", "bench/remarks.py")))
+"""Paths for git: to publish figures, and to say something of them, changes nothing that is measured."""
 _PRESSURE: Final = Path("/proc/pressure/cpu")
 _WATCHED_S: Final = 5.0
 
@@ -146,7 +146,7 @@ def read_rows(file: Path) -> list[Row]:
 
 
 def commit(root: Path = ROOT) -> str:
-    """Returns the short ID of the newest commit that changed more than the published figures.
+    """Returns the short ID of the newest commit that changed more than figures and what is said of them.
 
     CHANGED is behind it where the checkout has uncommitted changes besides these.
     """

@@ -76,11 +76,14 @@ def test_the_conditions_name_machine_commit_and_date() -> None:
     assert on.busy_percent is None or 0 <= on.busy_percent <= 101
 
 
+ABOUT_FIGURES = ("docs/benchmarks.json", "docs/benchmarks.md", "CHANGELOG.md", "bench/remarks.py")
+
+
 @pytest.fixture
 def checkout(tmp_path: Path) -> Path:
     git(tmp_path, "init", "--quiet")
-    (tmp_path / "docs").mkdir()
-    for file in ("program.py", "docs/benchmarks.json", "docs/benchmarks.md"):
+    for file in ("program.py", *ABOUT_FIGURES):
+        (tmp_path / file).parent.mkdir(exist_ok=True)
         (tmp_path / file).write_text("first")
     commit_all(tmp_path)
     return tmp_path
@@ -96,10 +99,10 @@ def commit_all(root: Path) -> None:
     git(root, "commit", "--quiet", "--no-verify", "--message", "change")
 
 
-def test_to_publish_changes_nothing_that_is_measured(checkout: Path) -> None:
+def test_to_publish_and_to_explain_changes_nothing_that_is_measured(checkout: Path) -> None:
     measured = commit(checkout)
-    for file in ("benchmarks.json", "benchmarks.md"):
-        (checkout / "docs" / file).write_text("published")
+    for file in ABOUT_FIGURES:
+        (checkout / file).write_text("published")
         assert commit(checkout) == measured
     commit_all(checkout)
     assert commit(checkout) == measured
