@@ -1,5 +1,8 @@
 """Adaptive bit rate: delay-based congestion control. Pure.
 
+What the first viewer's link carries is not known, so the bit rate starts low and doubles about once a second,
+up to the profile's target or the first sign of a queue (slow start).
+
 A congested link shows in a delay that is longer than its minimum (queue_delay.py): the age of the pictures
 where viewers report it, and the round-trip time. Then the bit rate falls at once, to below the rate that was
 delivered, so that the queue drains. Loss counts only where it exceeds what SRT can repair: a radio link loses
@@ -40,8 +43,12 @@ _PASSED: Final = 1.1
 """... until this share of it, where that rate is forgotten."""
 _SMALL_STEP: Final = 0.025
 """As a share of the bit rate."""
+_START_KBPS: Final = 1200
+"""For the first viewer, whose link is not known: what it does not carry waits there, and makes pictures old."""
+_PROBE_STEP: Final = 1.5
+"""Step up in every window until the first sign of a queue, as a factor."""
 _REMEMBERED_S: Final = 10.0
-"""Without viewers; the next one then starts with the profile's own rate."""
+"""Without viewers; the next one's link is then not known."""
 _FIRST_WAIT_S: Final = 4.0
 _LONGEST_WAIT_S: Final = 60.0
 _RTT_SLACK_MS: Final = 40.0
@@ -140,14 +147,23 @@ class BitrateController:
         """Before the next attempt to exceed it."""
         self._close_since: float | None = None
         """Since when the bit rate is close to the one that congested the link."""
-        self.retarget(target_kbps, floor_kbps)
-
-    def retarget(self, target_kbps: int, floor_kbps: int) -> None:
-        """Sets the limits of another profile and starts at its target."""
+        self._probing = True
+        """Whether no link has shown yet what it carries."""
         self._target_kbps = target_kbps
         self._floor_kbps = min(floor_kbps, target_kbps)
-        self._forget_congestion()
-        self._decision = Decision(target_kbps)
+        self._decision: Decision
+        self._start()
+
+    @property
+    def decision(self) -> Decision:
+        """The newest one."""
+        return self._decision
+
+    def retarget(self, target_kbps: int, floor_kbps: int) -> None:
+        """Sets the limits of another profile; the bit rate goes on from where it is."""
+        self._target_kbps = target_kbps
+        self._floor_kbps = min(floor_kbps, target_kbps)
+        self._start(self._decision.bitrate_kbps)
 
     def set_floor(self, floor_kbps: int) -> None:
         """Sets another lower limit; a bit rate below it rises to it with the next decision."""
@@ -160,14 +176,14 @@ class BitrateController:
             sample: of the window.
             now: monotonic seconds.
         """
+        joined = bool(sample.viewers) and not self._viewers
         self._observe(sample, now)
         if self._viewers:
             self._viewed_at = now
         if not self._viewers:
             # A viewer whose pictures have become too old joins anew, over the same link.
             if now - self._viewed_at >= _REMEMBERED_S:
-                self._forget_congestion()
-                self._decision = Decision(self._target_kbps)
+                self._start()
         elif signs := self._signs_of_congestion():
             self._calm_since = None
             held = now - self._last_decrease_at < _HOLD_AFTER_DECREASE_S and not self._overwhelmed
@@ -175,6 +191,9 @@ class BitrateController:
                 self._decrease(", ".join(signs), sample.stream_kbps, now)
         elif not all(delay.is_calm for delay in self._delays()):
             self._calm_since = None
+        elif self._probing:
+            if not joined:  # Before that, a window may have begun without a viewer.
+                self._probe()
         else:
             self._calm_since = now if self._calm_since is None else self._calm_since
             if self._may_increase(now):
@@ -195,7 +214,8 @@ class BitrateController:
             now: monotonic seconds.
         """
         self._overwhelmed = False
-        if now - self._last_decrease_at < _HOLD_OVERWHELMED_S:
+        at_the_floor = self._decision.bitrate_kbps <= self._floor_kbps
+        if at_the_floor or now - self._last_decrease_at < _HOLD_OVERWHELMED_S:
             return False
         known = [each for each in rtts_ms if each in self._viewers]
         self._overwhelmed = any(self._viewers[each].rtt.leaps_to(rtts_ms[each]) for each in known)
@@ -269,10 +289,26 @@ class BitrateController:
         self._wait_s = min(_LONGEST_WAIT_S, self._wait_s * 2 if self._close_since else self._wait_s)
         self._close_since = None
         self._last_decrease_at = now
+        self._probing = False
         if after < before:
             self._decision = Decision(after, f"{signs}: {bit_rate(before)} -> {bit_rate(after)}")
         elif after < self._target_kbps:
             self._decision = Decision(before, f"{signs}: at the floor of {bit_rate(before)}")
+
+    def _start(self, proven_kbps: int = 0) -> None:
+        """Begins the slow start: at what the links have carried so far, if that is known."""
+        self._forget_congestion()
+        start_kbps = max(self._floor_kbps, min(self._target_kbps, max(_START_KBPS, proven_kbps)))
+        self._probing = start_kbps < self._target_kbps
+        reason = f"it starts with {bit_rate(start_kbps)}: what a viewer's link carries is not known yet"
+        self._decision = Decision(start_kbps, reason if self._probing else "")
+
+    def _probe(self) -> None:
+        before = self._decision.bitrate_kbps
+        after = min(self._target_kbps, round(before * _PROBE_STEP))
+        self._probing = after < self._target_kbps
+        reason = f"the link has carried all so far: {bit_rate(before)} -> {bit_rate(after)}"
+        self._decision = Decision(after, reason if self._probing else "")
 
     def _may_increase(self, now: float) -> bool:
         return (

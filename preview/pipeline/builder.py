@@ -48,7 +48,7 @@ class Parts:
     body_pad: Any
     """Where its frames enter the rest."""
     rate: Any
-    apply_target: Callable[[Plan], None]
+    apply_target: Callable[[Plan, int], None]
     """Sets what changes with the profile behind the source, also while playing."""
     encoder: Any
     encoded_pad: Any
@@ -59,8 +59,12 @@ class Parts:
     pipe_in: Any
 
 
-def build(plan: Plan) -> Parts:
+def build(plan: Plan, bitrate_kbps: int) -> Parts:
     """Builds the pipeline of a plan.
+
+    Args:
+        plan: of the pipeline.
+        bitrate_kbps: of the encoder, to begin with.
 
     Raises:
         UserError: an element is missing, or the source's description is invalid.
@@ -77,8 +81,8 @@ def build(plan: Plan) -> Parts:
     encoder = find("encoder")
     apply_target = partial(_apply_target, find("rate_caps"), find("size"), encoder)
     highest_kbps = max(target.bitrate_kbps for target in plan.settings.profiles.targets.values())
-    properties.configure(encoder, plan.encoder, plan.target.bitrate_kbps, plan.gop_frames, highest_kbps)
-    apply_target(plan)
+    properties.configure(encoder, plan.encoder, bitrate_kbps, plan.gop_frames, highest_kbps)
+    apply_target(plan, bitrate_kbps)
     parser_pad = find("parser").get_static_pad("src")
     return Parts(
         pipeline=pipeline,
@@ -95,13 +99,13 @@ def build(plan: Plan) -> Parts:
     )
 
 
-def _apply_target(rate: Any, size: Any, encoder: Any, plan: Plan) -> None:
-    """Sets frame rate, frame size, bit rate and GOP length of the plan's profile; also while playing.
+def _apply_target(rate: Any, size: Any, encoder: Any, plan: Plan, bitrate_kbps: int) -> None:
+    """Sets frame rate, frame size and GOP length of the plan's profile, and the bit rate; also while playing.
 
     Bit rate and GOP length first: new caps reinitialise the encoder, with the properties it has then.
     """
     target = plan.target
-    properties.set_rates(encoder, plan.encoder, target.bitrate_kbps, plan.gop_frames)
+    properties.set_rates(encoder, plan.encoder, bitrate_kbps, plan.gop_frames)
     rate_caps = Gst.Caps.from_string(f"video/x-raw(ANY),framerate=[ 0/1, {target.fps}/1 ]")
     _set_caps(size, properties.size_caps(plan.encoder, target))
     _set_caps(rate, rate_caps)

@@ -63,15 +63,15 @@ class Runner:
     def __init__(self, plan: Plan, events: PipelineEvents) -> None:
         self.plan = plan
         self.measurement: Measurement | None = None
-        self._bitrate = Decision(plan.target.bitrate_kbps)
         self._timeouts = plan.settings.timeouts
         self._events = events
-        self._controller = BitrateController(plan.target.bitrate_kbps, plan.target.floor_kbps)
+        self._access_units: AccessUnits | None = None
+        self._controller = BitrateController(plan.target.bitrate_kbps, self._floor_kbps)
+        self._bitrate = self._controller.decision
         loop = self._loop = asyncio.get_running_loop()
-        parts = self._parts = builder.build(plan)
+        parts = self._parts = builder.build(plan, self._bitrate.bitrate_kbps)
         self._framing = Framing(parts, self._first_frame, self._source_ended, plan.target.fps)
         self._listener: Listener | None = None
-        self._access_units: AccessUnits | None = None
         self._keyframe_gate = KeyframeGate(parts, self._request_key_frame)
         self._file_loop: FileLoop | None = None
         self._attach_source()
@@ -128,15 +128,15 @@ class Runner:
         """Switches to another profile; viewers stay connected."""
         plan = self.plan = replace(self.plan, profile=profile)
         target = plan.target
-        self._bitrate = Decision(target.bitrate_kbps)
         self._controller.retarget(target.bitrate_kbps, self._floor_kbps)
+        bitrate = self._bitrate = self._controller.decision
         framing = self._framing
 
         def apply() -> None:
             # Of this moment: the camera may have changed while the driver was busy.
             parts = self._parts
             builder.apply_source_target(parts.source, plan)
-            parts.apply_target(plan)
+            parts.apply_target(plan, bitrate.bitrate_kbps)
             framing.set_rate(target.fps)
 
         await self._call_driver(apply, "the profile was changed")
@@ -275,11 +275,13 @@ class Runner:
 
     @property
     def _floor_kbps(self) -> int:
-        """Lower limit of the adaptive bit rate: a recording may have one of its own."""
-        profile_kbps = self.plan.target.floor_kbps
+        """Lower limit of the bit rate: the target if it is fixed; a recording may have one of its own."""
+        target, settings = self.plan.target, self.plan.settings
+        if not settings.adaptive.enabled:
+            return target.bitrate_kbps
         if self._access_units is None:
-            return profile_kbps
-        return max(profile_kbps, self.plan.settings.video_tap.floor_kbps)
+            return target.floor_kbps
+        return max(target.floor_kbps, settings.video_tap.floor_kbps)
 
     # --- events ---
 
@@ -358,17 +360,16 @@ class Runner:
 
     def _is_overwhelmed(self, now: float) -> bool:
         """Whether the bit rate can't wait for the end of the window."""
-        if not self.plan.settings.adaptive.enabled or self._is_pending("bit rate"):
+        if self._is_pending("bit rate"):
             return False
         return self._controller.is_overwhelmed(statistics.read(self._framing, self._listener).rtts_ms, now)
 
     def _measure(self, before: statistics.Reading) -> statistics.Reading:
         now = statistics.read(self._framing, self._listener)
         self.measurement = statistics.measure(before, now)
-        if self.plan.settings.adaptive.enabled:
-            links = statistics.measured_links(before, now)
-            age_ms = self._picture_age.counting(now.at)
-            self._adapt_bitrate(Sample(self.measurement.bitrate_kbps, links, age_ms))
+        links = statistics.measured_links(before, now)
+        age_ms = self._picture_age.counting(now.at)
+        self._adapt_bitrate(Sample(self.measurement.bitrate_kbps, links, age_ms))
         self._events.measured(self._listener.take_refused() if self._listener else 0)
         return now
 
