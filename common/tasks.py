@@ -14,6 +14,13 @@ async def cancel(tasks: Iterable[asyncio.Future[Any]]) -> list[object]:
     return ended
 
 
+async def end(tasks: Iterable[asyncio.Future[Any]]) -> None:
+    """Cancels tasks and waits until each has ended. Raises the first error of one that has failed."""
+    for outcome in await cancel(tasks):
+        if isinstance(outcome, BaseException) and not isinstance(outcome, asyncio.CancelledError):
+            raise outcome
+
+
 async def first_to_end(*parts: Coroutine[Any, Any, object]) -> None:
     """Runs coroutines until one ends, then cancels the others. Raises the error of the one that ended."""
     tasks = [asyncio.create_task(part) for part in parts]

@@ -44,7 +44,7 @@ _PASSED: Final = 1.1
 _SMALL_STEP: Final = 0.025
 """As a share of the bit rate."""
 _START_KBPS: Final = 1200
-"""For the first viewer, whose link is not known: what it does not carry waits there, and makes pictures old."""
+"""For the first viewer, whose link is not known: what that does not carry would make pictures old."""
 _PROBE_STEP: Final = 1.5
 """Step up in every window until the first sign of a queue, as a factor."""
 _REMEMBERED_S: Final = 10.0

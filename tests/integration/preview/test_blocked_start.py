@@ -92,7 +92,7 @@ async def test_a_camera_that_hangs_when_it_has_been_replaced_is_left_behind() ->
         await pipeline.stop()
     # What the end of the process does.
     Slow.released.set()
-    stop(pipeline._parts.pipeline)
+    stop(pipeline._running.parts.pipeline)
     pipeline._release()
     pipeline._framing.close()
 

@@ -70,7 +70,7 @@ async def test_an_age_that_the_camera_causes_is_not_of_the_link() -> None:
     age = runner._picture_age
     runner.take_picture_age(140)
     assert age.counting(time.monotonic()) == 140
-    pad = runner._parts.source.get_static_pad("src")
+    pad = runner._running.parts.source.get_static_pad("src")
     stalled = pad.add_probe(Gst.PadProbeType.BLOCK_DOWNSTREAM, lambda *_: Gst.PadProbeReturn.OK)
 
     async def counts() -> int | None:
@@ -95,7 +95,7 @@ async def test_a_recording_gets_every_encoded_frame() -> None:
         return Gst.PadProbeReturn.OK
 
     # Before anything may drop a frame.
-    runner._parts.encoder.get_static_pad("src").add_probe(Gst.PadProbeType.BUFFER, count)
+    runner._running.parts.encoder.get_static_pad("src").add_probe(Gst.PadProbeType.BUFFER, count)
     await runner.start()
     await events.wait_for("first_frame")
     viewer = asyncio.create_task(asyncio.to_thread(record, runner.plan.srt.port, 0.5))
@@ -149,7 +149,7 @@ async def test_the_end_of_a_camera_that_is_replaced_is_not_taken_for_that_of_the
     runner = Runner(plan_of(LIVE), events)
     await runner.start()
     await events.wait_for("first_frame")
-    end = runner._source_end
+    end = runner._camera._source_end
     runner.show(another("rear"))
     await events.wait_for("camera_shown")
     # As if the old camera's thread had come as far as this just before it was replaced.
