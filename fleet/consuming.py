@@ -1,14 +1,17 @@
 """Reading streams: pull requests to a consumer, and what comes back, within one session."""
 
+import asyncio
 import json
 import secrets
+import time
 from collections.abc import AsyncGenerator, Mapping
 from contextlib import aclosing, asynccontextmanager
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from common.backoff import Backoff
 from fleet.errors import HubError, HubReason
-from fleet.session import Message, Session, Waiter
+from fleet.session import NO_RESPONDERS, Message, Session, Waiter
 
 _PULL_EXPIRES_S: Final = 20.0
 """A pull request waits this long at the hub for messages."""
@@ -21,6 +24,10 @@ _BATCH: Final = 256
 _MAX_BYTES: Final = 4 * 1024 * 1024
 """Bytes requested at once; more than any single message may have."""
 _TIMEOUT_S: Final = 5.0
+_FIRST_PAUSE_S: Final = 0.05
+_LONGEST_PAUSE_S: Final = 0.5
+_KNOWN_WITHIN_S: Final = 3.0
+"""From a pull request that no node could pass on until the consumer counts as unknown."""
 _NANOSECONDS: Final = 1_000_000_000
 
 
@@ -204,6 +211,8 @@ class _Puller:
         self._waiter = waiter
         self._inbox = reply
         self._requests = 0
+        self._known = False
+        """Whether the consumer has answered."""
 
     @classmethod
     @asynccontextmanager
@@ -229,18 +238,32 @@ class _Puller:
             "expires": int(expires_s * _NANOSECONDS),
             "idle_heartbeat": int(heartbeat_s * _NANOSECONDS),
         }
-        self._requests += 1
-        reply = f"{self._inbox}.{self._requests}"
-        await self._session.send(self._subject, json.dumps(request).encode(), reply)
+        backoff, known_by_s = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S), time.monotonic() + _KNOWN_WITHIN_S
+        reply = await self._send(request)
         received = 0
         while received < batch:
             message = await self._waiter.get(2 * heartbeat_s + _TIMEOUT_S / 2)
+            # A status of an earlier request, which was complete, may come late.
+            if message.status and message.subject != reply:
+                continue
+            if message.status == NO_RESPONDERS and not self._known and time.monotonic() < known_by_s:
+                # A node that has just started, or been joined, may not have heard of a new consumer yet.
+                await asyncio.sleep(backoff.next_s())
+                reply = await self._send(request)
+                continue
+            self._known = True
             if not message.status:
                 received += 1
                 yield delivery(self._session, message)
-            elif message.subject == reply and self._is_end(message):
-                # A status of an earlier request, which was complete, may come late.
+            elif self._is_end(message):
                 return
+
+    async def _send(self, request: dict[str, int]) -> str:
+        """Sends a pull request; returns the subject of its answers."""
+        self._requests += 1
+        reply = f"{self._inbox}.{self._requests}"
+        await self._session.send(self._subject, json.dumps(request).encode(), reply)
+        return reply
 
     def _is_end(self, message: Message) -> bool:
         """Whether a status ends the request, as opposed to a heartbeat.
@@ -256,7 +279,7 @@ class _Puller:
                 return True
             case "409" if "batch completed" in description.lower() or "maxbytes" in description.lower():
                 return True
-            case "503":
+            case status if status == NO_RESPONDERS:
                 raise HubError(
                     HubReason.NO_RESPONDERS, f"the hub does not know the consumer {self._consumer}"
                 )

@@ -37,7 +37,7 @@ _MAX_MESSAGE: Final = 4 * 1024 * 1024
 _MAX_WAITING: Final = 8 * 1024 * 1024
 """Bytes that may wait in one subscription, or for one caller."""
 _MAX_WAITING_MESSAGES: Final = 4096
-_NO_RESPONDERS: Final = "503"
+NO_RESPONDERS: Final = "503"
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,7 +288,7 @@ class Session:
         with self.waiter(subject) as (waiter, reply):
             await self._publish(subject, payload, reply, headers)
             message = await waiter.get(timeout_s)
-        if message.status == _NO_RESPONDERS and not message.payload:
+        if message.status == NO_RESPONDERS and not message.payload:
             raise HubError(HubReason.NO_RESPONDERS, f"nothing at the hub takes {subject}")
         return message
 

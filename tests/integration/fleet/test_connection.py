@@ -10,6 +10,7 @@ import pytest
 
 from fleet import names
 from fleet.connection import FleetAddress, Published, Request, Start, connect
+from fleet.consuming import pull
 from fleet.errors import HubError, HubReason, UnreachableError
 from fleet.session import Message, Session
 from hub import streams
@@ -211,6 +212,31 @@ async def test_one_robot_has_a_share_of_the_requests_in_hand(servers: NatsServer
         proceed.set()
         assert await asked == b"done"
         assert sorted(await asyncio.gather(*pending)) == [b"busy"] * 4 + [b"done"] * 2
+
+
+async def test_a_consumer_that_the_server_has_not_heard_of_yet_is_waited_for(servers: NatsServers) -> None:
+    """In a cluster, a node that has just started passes nothing on to a consumer that has just been made."""
+    session = await Session.open(servers.urls[0], credentials=None, ca=None, inbox="_INBOX.x", name="")
+    async with connect(FleetAddress(servers.urls)) as hub:
+        await hub.connected(10)
+        await hub.publish_once(names.command_subject("r2", "c1"), b"early")
+        async with aclosing(pull(session, names.COMMANDS, "r2", 1)) as deliveries:
+            first = asyncio.ensure_future(anext(deliveries))
+            # The first request has been refused by then.
+            await asyncio.wait({first}, timeout=0.3)
+            assert not first.done()
+            await streams.add_command_consumer(hub, "r2")
+            assert (await asyncio.wait_for(first, 5)).payload == b"early"
+    await session.close()
+
+
+async def test_a_consumer_that_never_appears_is_an_error(servers: NatsServers) -> None:
+    session = await Session.open(servers.urls[0], credentials=None, ca=None, inbox="_INBOX.x", name="")
+    async with aclosing(pull(session, names.COMMANDS, "r2", 1)) as deliveries:
+        with pytest.raises(HubError, match="does not know the consumer r2") as caught:
+            await asyncio.wait_for(anext(deliveries), 10)
+    assert caught.value.reason is HubReason.NO_RESPONDERS
+    await session.close()
 
 
 _GREETINGS = (
