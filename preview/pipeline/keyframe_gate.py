@@ -26,8 +26,8 @@ from preview.pipeline.threads import call_on_loop
 
 _MIN_INTERVAL_S: Final = 0.3
 """Rate limit: viewers that connect within this time share one key frame."""
-_MAX_DROPPED: Final = 3
-"""Frames; an encoder that ignores the request must not stop the stream."""
+_MAX_DROPPED: Final = 6
+"""Frames; an encoder that ignores the request must not stop the stream. On a busy robot it gets it late."""
 _MAX_AWAITED: Final = 10
 """Frames until a requested key frame counts as ignored."""
 _LOSS_BURST: Final = 3
