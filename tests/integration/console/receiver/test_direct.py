@@ -532,6 +532,7 @@ def test_a_stream_whose_pts_wraps_goes_on_with_true_capture_times(port: int, pie
     assert times_ns[0] < WRAP_TICKS * 100_000 // 9 < times_ns[-1]
 
 
+@pytest.mark.timed
 def test_a_narrow_link_does_not_make_frames_old(port: int) -> None:
     """2500 kbit/s over 1500 kbit/s: past the bound the connection is made anew."""
     pieces = encode("h264", 150, gop=10, kbps=2500, pattern="snow")
