@@ -98,7 +98,7 @@ class Decision:
 
     Args:
         bitrate_kbps: between the floor and the target.
-        reason: one line for people; empty at the target.
+        reason: one line for people; empty at the target, and on the way there from the start.
     """
 
     bitrate_kbps: int
@@ -300,15 +300,12 @@ class BitrateController:
         self._forget_congestion()
         start_kbps = max(self._floor_kbps, min(self._target_kbps, max(_START_KBPS, proven_kbps)))
         self._probing = start_kbps < self._target_kbps
-        reason = f"it starts with {bit_rate(start_kbps)}: what a viewer's link carries is not known yet"
-        self._decision = Decision(start_kbps, reason if self._probing else "")
+        self._decision = Decision(start_kbps)
 
     def _probe(self) -> None:
-        before = self._decision.bitrate_kbps
-        after = min(self._target_kbps, round(before * _PROBE_STEP))
+        after = min(self._target_kbps, round(self._decision.bitrate_kbps * _PROBE_STEP))
         self._probing = after < self._target_kbps
-        reason = f"the link has carried all so far: {bit_rate(before)} -> {bit_rate(after)}"
-        self._decision = Decision(after, reason if self._probing else "")
+        self._decision = Decision(after)
 
     def _may_increase(self, now: float) -> bool:
         return (

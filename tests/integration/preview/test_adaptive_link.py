@@ -5,11 +5,25 @@ from pathlib import Path
 
 import pytest
 
+from omniseer.preview.v1 import preview_service_pb2 as pb
 from tests.support.running_preview import RunningPreview
 from tests.support.udp_link import Impairment, UdpLink
 from tests.support.watcher import Watcher
 
 pytestmark = pytest.mark.gst
+
+
+def test_the_first_viewer_gets_a_low_rate_first_and_soon_the_target(tmp_path: Path) -> None:
+    with RunningPreview(tmp_path, small=False) as preview:
+        preview.enable(pb.PROFILE_BALANCED)
+        assert preview.running().stream.target_bitrate_kbps == 1200
+        with Watcher(preview.port) as watcher:
+            stream = preview.wait_for(lambda a: a.stream.target_bitrate_kbps == 2500, "the target").stream
+            assert stream.bitrate_reason == ""
+            watcher.wait_for_frames(30)
+            preview.enable(pb.PROFILE_HIGH_QUALITY)
+            preview.wait_for(lambda a: a.stream.target_bitrate_kbps == 4500, "the higher target")
+            assert watcher.reconnects == 0
 
 
 def test_a_bad_link_gets_less_and_a_good_one_more(tmp_path: Path) -> None:

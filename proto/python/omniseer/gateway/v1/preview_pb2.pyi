@@ -241,7 +241,8 @@ class PreviewStatus(_message.Message):
     """Whether the preview service (the program that makes the video) answers the gateway."""
     bitrate_reason: _builtins.str
     """Why the target bit rate is what it is, for a person to read, when the robot changed it on its
-    own ("RTT 180 ms, 6 % loss: 2500 -> 1200 kbit/s"). Empty when it is the profile's own.
+    own ("RTT 180 ms, 6 % loss: 2500 -> 1200 kbit/s"). Empty when it is the profile's own, or on its way there
+    from the low one that the first viewer gets.
     """
     wanted_camera: _builtins.str
     """Name of the camera that an operator chose last, or the robot's first one: it is live as far as it works.

@@ -400,7 +400,7 @@ class Stream(_message.Message):
     encrypted: _builtins.bool
     """Whether the listener requires a passphrase."""
     bitrate_reason: _builtins.str
-    """Why it differs from the profile's own, for people. Empty when it does not."""
+    """Why it differs from the profile's own, for people. Empty when it does not, and on its way there from the start."""
     def __init__(
         self,
         *,
