@@ -1,7 +1,7 @@
 """Adaptive bit rate: delay-based congestion control. Pure.
 
-What the first viewer's link carries is not known, so the bit rate starts low and doubles about once a second,
-up to the profile's target or the first sign of a queue (slow start).
+Without viewers the bit rate is the profile's target. With the first one, of whose link nothing is known, it
+starts low and doubles about once a second, up to the target or the first sign of a queue (slow start).
 
 A congested link shows in a delay that is longer than its minimum (queue_delay.py): the age of the pictures
 where viewers report it, and the round-trip time. Then the bit rate falls at once, to below the rate that was
@@ -147,12 +147,11 @@ class BitrateController:
         """Before the next attempt to exceed it."""
         self._close_since: float | None = None
         """Since when the bit rate is close to the one that congested the link."""
-        self._probing = True
-        """Whether no link has shown yet what it carries."""
+        self._known = self._probing = False
+        """Whether anything is known of the viewers' links; whether they have carried all so far."""
         self._target_kbps = target_kbps
         self._floor_kbps = min(floor_kbps, target_kbps)
-        self._decision: Decision
-        self._start()
+        self._decision = Decision(target_kbps)
 
     @property
     def decision(self) -> Decision:
@@ -160,10 +159,20 @@ class BitrateController:
         return self._decision
 
     def retarget(self, target_kbps: int, floor_kbps: int) -> None:
-        """Sets the limits of another profile; the bit rate goes on from where it is."""
+        """Sets the limits of another profile; with viewers, the bit rate goes on from where it is."""
         self._target_kbps = target_kbps
         self._floor_kbps = min(floor_kbps, target_kbps)
-        self._start(self._decision.bitrate_kbps)
+        if self._known:
+            self._start(self._decision.bitrate_kbps)
+        else:
+            self._decision = Decision(target_kbps)
+
+    def connect(self, now: float) -> Decision:
+        """Returns the bit rate for a viewer that connects, at monotonic seconds `now`."""
+        self._viewed_at = now
+        if not self._known:
+            self._start()
+        return self._decision
 
     def set_floor(self, floor_kbps: int) -> None:
         """Sets another lower limit; a bit rate below it rises to it with the next decision."""
@@ -176,28 +185,16 @@ class BitrateController:
             sample: of the window.
             now: monotonic seconds.
         """
-        joined = bool(sample.viewers) and not self._viewers
+        joined = not self._viewers
         self._observe(sample, now)
         if self._viewers:
-            self._viewed_at = now
-        if not self._viewers:
-            # A viewer whose pictures have become too old joins anew, over the same link.
-            if now - self._viewed_at >= _REMEMBERED_S:
-                self._start()
-        elif signs := self._signs_of_congestion():
-            self._calm_since = None
-            held = now - self._last_decrease_at < _HOLD_AFTER_DECREASE_S and not self._overwhelmed
-            if not held and not self._is_draining():
-                self._decrease(", ".join(signs), sample.stream_kbps, now)
-        elif not all(delay.is_calm for delay in self._delays()):
-            self._calm_since = None
-        elif self._probing:
-            if not joined:  # Before that, a window may have begun without a viewer.
-                self._probe()
-        else:
-            self._calm_since = now if self._calm_since is None else self._calm_since
-            if self._may_increase(now):
-                self._increase(now)
+            self.connect(now)
+            self._follow(sample, now, joined=joined)
+        elif now - self._viewed_at >= _REMEMBERED_S:
+            # Before that, a viewer whose pictures have become too old joins anew, over the same link.
+            self._forget_congestion()
+            self._known = self._probing = False
+            self._decision = Decision(self._target_kbps)
         if self._decision.bitrate_kbps < self._floor_kbps:
             self._decision = Decision(
                 self._floor_kbps, f"a recording holds it at {bit_rate(self._floor_kbps)} at least"
@@ -220,6 +217,23 @@ class BitrateController:
         known = [each for each in rtts_ms if each in self._viewers]
         self._overwhelmed = any(self._viewers[each].rtt.leaps_to(rtts_ms[each]) for each in known)
         return self._overwhelmed
+
+    def _follow(self, sample: Sample, now: float, *, joined: bool) -> None:
+        """Changes the bit rate as far as the links require or permit it."""
+        if signs := self._signs_of_congestion():
+            self._calm_since = None
+            held = now - self._last_decrease_at < _HOLD_AFTER_DECREASE_S and not self._overwhelmed
+            if not held and not self._is_draining():
+                self._decrease(", ".join(signs), sample.stream_kbps, now)
+        elif not all(delay.is_calm for delay in self._delays()):
+            self._calm_since = None
+        elif self._probing:
+            if not joined:  # Otherwise the window has begun without a viewer.
+                self._probe()
+        else:
+            self._calm_since = now if self._calm_since is None else self._calm_since
+            if self._may_increase(now):
+                self._increase(now)
 
     def _observe(self, sample: Sample, now: float) -> None:
         if sample.viewers:
@@ -298,6 +312,7 @@ class BitrateController:
     def _start(self, proven_kbps: int = 0) -> None:
         """Begins the slow start: at what the links have carried so far, if that is known."""
         self._forget_congestion()
+        self._known = True
         start_kbps = max(self._floor_kbps, min(self._target_kbps, max(_START_KBPS, proven_kbps)))
         self._probing = start_kbps < self._target_kbps
         self._decision = Decision(start_kbps)

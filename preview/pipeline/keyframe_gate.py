@@ -41,11 +41,15 @@ class KeyframeGate:
     Args:
         parts: the pipeline.
         request_key_frame: requests a key frame of the encoder; called on the event loop.
+        on_viewer: called on the event loop for each viewer that connects, before its key frame is requested.
     """
 
-    def __init__(self, parts: Parts, request_key_frame: Callable[[], None]) -> None:
+    def __init__(
+        self, parts: Parts, request_key_frame: Callable[[], None], on_viewer: Callable[[], None]
+    ) -> None:
         self._loop = asyncio.get_running_loop()
         self._request_key_frame = request_key_frame
+        self._on_viewer = on_viewer
         self._last_request_at = float("-inf")
         self._timer: asyncio.TimerHandle | None = None
         self._pad: Any = parts.parser_pad
@@ -146,6 +150,7 @@ class KeyframeGate:
             return Gst.PadProbeReturn.REMOVE
 
     def _viewer_connected(self) -> None:
+        self._on_viewer()
         wait_s = self._last_request_at + _MIN_INTERVAL_S - time.monotonic()
         if wait_s <= 0:
             self._request_for_viewers()

@@ -77,7 +77,7 @@ class Runner:
             read_bus=self._read_bus,
         )
         self._listener: Listener | None = None
-        self._keyframe_gate = KeyframeGate(parts, self._driver.request_key_frame)
+        self._keyframe_gate = KeyframeGate(parts, self._driver.request_key_frame, self._viewer_connected)
         self._begun = False
         """Whether the first frame has come."""
         self._bus = parts.pipeline.get_bus()
@@ -269,6 +269,11 @@ class Runner:
         if not self._running.has_ended:
             self._begun = True
             self._events.first_frame()
+
+    def _viewer_connected(self) -> None:
+        """Lowers the bit rate for a first viewer, before its key frame is made."""
+        if not self._running.has_ended:
+            self._driver.set_bitrate(self._controller.connect(time.monotonic()))
 
     def _listener_failed(self, fault: Fault) -> None:
         if not self._running.has_ended and not self._events.listener_failed(fault):

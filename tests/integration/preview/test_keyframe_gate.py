@@ -94,11 +94,15 @@ class Ground:
         parts: Any = SimpleNamespace(parser_pad=self.pad)
         self.requested = 0
         # Its calls on the loop, which request key frames for new viewers, wait until the test awaits.
-        self.gate = KeyframeGate(parts, self._request)
+        self.viewers = 0
+        self.gate = KeyframeGate(parts, self._request, self._take_viewer)
         self.gate.watch(self.sink)
 
     def _request(self) -> None:
         self.requested += 1
+
+    def _take_viewer(self) -> None:
+        self.viewers += 1
 
     def elsewhere(self, call: Callable[[], object]) -> Callable[[], None]:
         """Returns a function that makes the call on another thread, and waits for it for a moment."""

@@ -56,26 +56,38 @@ def settled() -> Run:
 
 def test_it_starts_low_and_a_quiet_link_gets_the_target_soon() -> None:
     run = Run()
-    assert run.controller.decision.bitrate_kbps == 1200
+    assert run.controller.connect(0.0).bitrate_kbps == 1200
     assert run.rates(10) == [1200, 1800] + [2500] * 18
     assert run.after(QUIET) == Decision(2500)
 
 
 def test_a_target_below_the_start_is_the_start() -> None:
     run = Run(1000, 300)
-    assert run.controller.decision == Decision(1000)
+    assert run.controller.connect(0.0) == Decision(1000)
     assert set(run.rates(5)) == {1000}
 
 
 def test_a_floor_above_the_start_is_the_start() -> None:
-    assert Run(2500, 2500).controller.decision == Decision(2500)
+    assert Run(2500, 2500).controller.connect(0.0) == Decision(2500)
 
 
-def test_it_waits_for_the_first_viewer() -> None:
+def test_without_a_viewer_it_is_the_target() -> None:
+    """A recording has all of it."""
     run = Run()
-    assert set(run.rates(30, NO_VIEWER)) == {1200}
-    assert run.after(NO_VIEWER).reason == "", "nothing is wrong"
+    assert set(run.rates(30, NO_VIEWER)) == {2500}
     assert run.rates(1.5) == [1200, 1800, 2500]
+
+
+def test_a_viewer_that_has_connected_is_waited_for() -> None:
+    """It is in the statistics of the next window at the earliest."""
+    run = Run()
+    assert run.controller.connect(run.now) == Decision(1200)
+    assert set(run.rates(2, NO_VIEWER)) == {1200}
+    assert run.rates(1.5) == [1200, 1800, 2500]
+
+
+def test_another_viewer_changes_nothing(settled: Run) -> None:
+    assert settled.controller.connect(settled.now).bitrate_kbps == 2500
 
 
 def test_the_start_ends_at_the_first_sign_of_a_queue() -> None:
@@ -90,7 +102,7 @@ def test_the_start_ends_at_the_first_sign_of_a_queue() -> None:
 def test_the_start_on_a_narrow_link_makes_no_old_pictures() -> None:
     """From the target on, 4500 kbit/s, the first second alone left two more in the queue."""
     controller, link = BitrateController(TARGET, FLOOR), Link(1500, queue_ms=None)
-    ages, rate = [], controller.decision.bitrate_kbps
+    ages, rate = [], controller.connect(0.0).bitrate_kbps
     for step in range(40):
         report = link.carry(rate)
         rate = controller.decide(report, step * WINDOW_S).bitrate_kbps
@@ -239,11 +251,13 @@ def test_the_age_is_judged_before_loss(settled: Run) -> None:
     assert settled.after(sample(age_ms=900, loss=80)).reason.startswith("pictures 900 ms old, 40 % loss")
 
 
-def test_without_viewers_it_starts_anew_after_a_while(settled: Run) -> None:
-    lowered = settled.after(CONGESTED).bitrate_kbps
-    assert set(settled.rates(9, NO_VIEWER)) == {lowered}
-    assert settled.rates(2, NO_VIEWER)[-1] == 1200
-    assert settled.rates(1.5) == [1200, 1800, 2500]
+def test_without_viewers_the_target_comes_back_after_a_while(settled: Run) -> None:
+    settled.after(CONGESTED)
+    lower = settled.rates(9, NO_VIEWER)
+    assert max(lower) < 2500
+    assert settled.rates(2, NO_VIEWER)[-1] == 2500
+    assert settled.after(NO_VIEWER) == Decision(2500)
+    assert settled.rates(1.5) == [1200, 1800, 2500], "another viewer's link is not known"
 
 
 def test_a_viewer_that_joins_anew_finds_the_rate_that_it_left(settled: Run) -> None:
@@ -281,6 +295,12 @@ def test_a_queue_that_fills_fast_is_answered_within_the_window_and_by_half(settl
 def test_heavy_loss_is_answered_by_its_own_size(settled: Run) -> None:
     """At the first sign: what is sent in the meantime has to be sent again, too."""
     assert settled.after(sample(loss=60)).bitrate_kbps == pytest.approx(2500 * 0.4 * 0.85, abs=2)
+
+
+def test_another_profile_without_viewers_has_its_target() -> None:
+    run = Run()
+    run.controller.retarget(4500, 800)
+    assert run.controller.decision == Decision(4500)
 
 
 def test_another_profile_begins_with_what_the_links_have_carried(settled: Run) -> None:
