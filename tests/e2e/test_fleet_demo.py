@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[2]
 
 STEPS = ["hub", "robots", "event", "node killed", "snapshot", "upload", "get", "revoke", "stop"]
 
-pytestmark = [pytest.mark.ros, pytest.mark.alone, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.ros, pytest.mark.timed, pytest.mark.alone, pytest.mark.timeout(300)]
 
 
 def test_the_main_job(tmp_path: Path) -> None:

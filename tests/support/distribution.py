@@ -6,8 +6,9 @@ because the start of a deployment takes all processors. What starts a whole robo
 and measures time, gets the mark `alone` for the same reason.
 
 A worker is a foreground or a background one. Encoders, cameras and containers that get no processor for a
-second count as failed, so their files (`is_paced`) are for the foreground, two at a time. The other files
-mostly wait; background workers run them with what the foreground leaves of the processors.
+second count as failed, and a driver who gets none for less stops the robot, so their files (`is_paced`) are
+for the foreground, two at a time. The other files mostly wait; background workers run them with what the
+foreground leaves of the processors.
 """
 
 import os
@@ -23,6 +24,7 @@ _BACKGROUND_NICE: Final = 10
 """A tenth of the weight of 0 (sched(7))."""
 _BACKGROUND: Final = "robot_gateway_background"
 _PACED_MARKS: Final = ("pytest.mark.gst", "pytest.mark.docker")
+_PACED_FOLDERS: Final = ("/tests/integration/drive/", "/tests/integration/gateway/teleop/")
 
 _CONTAINERS: Final = "tests/e2e/containers/"
 _STAND_INS: Final = tuple(
@@ -195,6 +197,8 @@ def unit_of(file: str) -> str:
 @cache
 def is_paced(file: Path) -> bool:
     """Returns whether the file's tests run what fails where it gets no processor in time."""
+    if any(folder in file.as_posix() for folder in _PACED_FOLDERS):
+        return True
     text = file.read_text(encoding="utf-8")
     return any(mark in text for mark in _PACED_MARKS)
 
