@@ -14,6 +14,7 @@ from console.client import (
     DrivePhase,
     DriveSession,
     GatewayError,
+    Refused,
     Supervision,
 )
 from drive.config import DriveSettings
@@ -170,8 +171,15 @@ async def stop_by(
     async def has_zero() -> bool:
         return len(base.heard) > heard
 
+    async def is_reset() -> bool:
+        try:
+            await operator.reset_stop(stopped.stop.stop_id)
+        except Refused:  # It is not known yet what else commands the robot.
+            return False
+        return True
+
     await eventually(has_zero, bool, "the base has zero")
-    await operator.reset_stop(stopped.stop.stop_id)
+    await eventually(is_reset, bool, "the stop is reset")
     return base.heard[heard].at_s - began_s, answered_s
 
 
