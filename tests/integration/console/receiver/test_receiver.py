@@ -189,8 +189,16 @@ def test_nothing_is_left_behind(sender: SrtSender, port: int) -> None:
     def one_visit() -> None:
         with viewer(port) as receiver:
             joined(sender)
-            sender.send(piece)
-            receiver.next_frame(PATIENCE_S)
+            wait_until(lambda: shows(receiver), "the frame is shown", PATIENCE_S)
+
+    def shows(receiver: Receiver) -> bool:
+        """Sends the frame again each time: a viewer whose handshake was slow has dialled anew and lost it."""
+        sender.send(piece)
+        try:
+            receiver.next_frame(1.0)
+        except NoFrameError:
+            return False
+        return True
 
     one_visit()
     threads, files = threading.active_count(), open_files()
