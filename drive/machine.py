@@ -207,7 +207,7 @@ def reset_obstacle(state: State, now_ns: int) -> str:
             "end that first, or begin to drive, which keeps it away, and reset the stop then"
         )
     if state.lease is None and not surroundings.sources_known:
-        return "it is not known yet what else commands the robot: try again in 3 s"
+        return "it is not known yet, so soon after the start, what else commands the robot: try again in 3 s"
     if surroundings.outranked:
         return "another source moves the robot: end that first"
     return ""

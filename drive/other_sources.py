@@ -22,28 +22,22 @@ _LOOK_EVERY_NS: Final = 500 * MS
 _DISCOVERY_NS: Final = 3_000 * MS
 """From the start until the multiplexer and its inputs are discovered, if there are any."""
 _COMMANDED_NS: Final = 1_000 * MS
-"""A source that has commanded motion counts as one that does for so long: twice twist_mux's usual timeout.
-So long an input is listened to before its silence means anything."""
+"""A source that has commanded motion counts as one that does for so long: twice twist_mux's usual timeout."""
 
 
 class _Input:
-    """One input of the multiplexer."""
+    """One input of the multiplexer. Until it has been listened to for a while, doubt counts as motion."""
 
     def __init__(self, node: Any, topic: str, type_name: str, now_ns: int) -> None:
         self.subscription = subscribe(node, type_name, topic)
-        self._known_from_ns = now_ns + _COMMANDED_NS
-        self._commanded_ns: int | None = None
-
-    def known(self, now_ns: int) -> bool:
-        """Whether it has been listened to for long enough."""
-        return now_ns >= self._known_from_ns
+        self._commanded_ns = now_ns
 
     def commands(self, now_ns: int) -> bool:
         """Takes what has arrived; returns whether motion was commanded lately."""
         message = newest(self.subscription)
         if message is not None and velocity_of(message) != ZERO:
             self._commanded_ns = now_ns
-        return self._commanded_ns is not None and now_ns - self._commanded_ns <= _COMMANDED_NS
+        return now_ns - self._commanded_ns <= _COMMANDED_NS
 
 
 class OtherSources:
@@ -64,11 +58,8 @@ class OtherSources:
         self._looked_ns = 0
 
     def known(self, now_ns: int) -> bool:
-        """Whether there has been time enough to discover them, and to listen to each that was found."""
-        if now_ns < self._known_from_ns:
-            return False
-        followed = self._found.keys() <= self._inputs.keys() or len(self._inputs) >= _MOST
-        return followed and all(each.known(now_ns) for each in self._inputs.values())
+        """Whether there has been time enough to discover them."""
+        return now_ns >= self._known_from_ns
 
     def commanding(self, now_ns: int) -> tuple[str, ...]:
         """Returns the topics on which motion was commanded lately."""
