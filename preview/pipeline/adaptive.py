@@ -149,9 +149,8 @@ class BitrateController:
         """Since when the bit rate is close to the one that congested the link."""
         self._known = self._probing = False
         """Whether anything is known of the viewers' links; whether they have carried all so far."""
-        self._target_kbps = target_kbps
-        self._floor_kbps = min(floor_kbps, target_kbps)
         self._decision = Decision(target_kbps)
+        self.retarget(target_kbps, floor_kbps)
 
     @property
     def decision(self) -> Decision:

@@ -59,12 +59,8 @@ class Parts:
     pipe_in: Any
 
 
-def build(plan: Plan, bitrate_kbps: int) -> Parts:
-    """Builds the pipeline of a plan.
-
-    Args:
-        plan: of the pipeline.
-        bitrate_kbps: of the encoder, to begin with.
+def build(plan: Plan) -> Parts:
+    """Builds the pipeline of a plan, with the bit rate of its profile.
 
     Raises:
         UserError: an element is missing, or the source's description is invalid.
@@ -81,8 +77,8 @@ def build(plan: Plan, bitrate_kbps: int) -> Parts:
     encoder = find("encoder")
     apply_target = partial(_apply_target, find("rate_caps"), find("size"), encoder)
     highest_kbps = max(target.bitrate_kbps for target in plan.settings.profiles.targets.values())
-    properties.configure(encoder, plan.encoder, bitrate_kbps, plan.gop_frames, highest_kbps)
-    apply_target(plan, bitrate_kbps)
+    properties.configure(encoder, plan.encoder, plan.target.bitrate_kbps, plan.gop_frames, highest_kbps)
+    apply_target(plan, plan.target.bitrate_kbps)
     parser_pad = find("parser").get_static_pad("src")
     return Parts(
         pipeline=pipeline,

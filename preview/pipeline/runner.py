@@ -63,11 +63,10 @@ class Runner:
         self._loop = asyncio.get_running_loop()
         self._access_units: AccessUnits | None = None
         self._controller = BitrateController(plan.target.bitrate_kbps, _floor_kbps(plan, recorded=False))
-        bitrate = self._controller.decision
-        parts = builder.build(plan, bitrate.bitrate_kbps)
+        parts = builder.build(plan)
         self._running = Running(plan, parts, self._loop.create_future())
         self._framing = Framing(parts, self._first_frame, self._source_ended, plan.target.fps)
-        self._driver = EncoderDriver(self._running, bitrate, self._fail)
+        self._driver = EncoderDriver(self._running, self._controller.decision, self._fail)
         self._camera = LiveCamera(
             self._running,
             self._driver,
