@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any, Final
 
 from common.tasks import end
+from common.units import bit_rate
 from preview.encoders import properties
 from preview.pipeline import faults
 from preview.pipeline.adaptive import Decision
@@ -87,7 +88,7 @@ class EncoderDriver:
         await end(self._tasks.values())
 
     async def _set_bitrate(self, decision: Decision) -> None:
-        _log.info("bit rate: %s", decision.reason)
+        _log.info("bit rate: %s", decision.reason or bit_rate(decision.bitrate_kbps))
         running = self._running
         encoder, plan = running.parts.encoder, running.plan
 
