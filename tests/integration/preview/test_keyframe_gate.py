@@ -93,16 +93,17 @@ class Ground:
         self._threads: list[threading.Thread] = []
         parts: Any = SimpleNamespace(parser_pad=self.pad)
         self.requested = 0
+        self.calls: list[str] = []
         # Its calls on the loop, which request key frames for new viewers, wait until the test awaits.
-        self.viewers = 0
         self.gate = KeyframeGate(parts, self._request, self._take_viewer)
         self.gate.watch(self.sink)
 
     def _request(self) -> None:
         self.requested += 1
+        self.calls.append("key frame")
 
     def _take_viewer(self) -> None:
-        self.viewers += 1
+        self.calls.append("viewer")
 
     def elsewhere(self, call: Callable[[], object]) -> Callable[[], None]:
         """Returns a function that makes the call on another thread, and waits for it for a moment."""
@@ -145,6 +146,16 @@ async def test_after_its_limit_the_gate_opens_without_a_key_frame() -> None:
     ground.sink.connect_viewer()
     passed = [ground.pad.push(Buffer(key_frame=False)) for _ in range(8)]
     assert passed == [False] * 6 + [True] * 2
+
+
+async def test_a_viewer_is_announced_before_its_key_frame_is_requested() -> None:
+    ground = Ground()
+    ground.sink.connect_viewer()
+
+    async def calls() -> list[str]:
+        return ground.calls
+
+    assert await eventually(calls, lambda made: len(made) == 2, "both calls") == ["viewer", "key frame"]
 
 
 async def test_detached_no_probe_is_left() -> None:

@@ -38,13 +38,13 @@ async def test_a_defect_of_the_writer_ends_the_recorder_and_leaves_no_operation_
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also where the recorder is stopped while the writer's thread still cleans up."""
-    cleaned_up, abandon = threading.Event(), Output.abandon
+    abandon = Output.abandon
 
     def broken(_output: Output, _item: Item) -> None:
         raise ValueError("a defect")
 
     def slow(output: Output) -> None:
-        cleaned_up.wait(1.0)
+        threading.Event().wait(1.0)
         abandon(output)
 
     async def record() -> None:
@@ -58,7 +58,6 @@ async def test_a_defect_of_the_writer_ends_the_recorder_and_leaves_no_operation_
 
     with pytest.raises(RuntimeError, match="the writer has ended"):
         await record()
-    cleaned_up.set()
 
 
 async def test_what_has_waited_is_flushed_in_between(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
