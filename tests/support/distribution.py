@@ -3,7 +3,8 @@
 pytest-xdist's workers get whole files, the longest first. Those files of tests/e2e/containers that deploy the
 system are two units, those that share the containers of `_shared_demo` (its conftest.py) and the others,
 because the start of a deployment takes all processors. What starts a whole robot with video or in containers,
-and measures time, gets the mark `alone` for the same reason.
+and measures time, gets the mark `alone` for the same reason. So does what drives against time: after 250 ms
+without a processor its driver counts as lost.
 
 A worker is a foreground or a background one. Encoders, cameras and containers that get no processor for a
 second count as failed, and a driver who gets none for less stops the robot, so their files (`is_paced`) are
@@ -24,7 +25,7 @@ _BACKGROUND_NICE: Final = 10
 """A tenth of the weight of 0 (sched(7))."""
 _BACKGROUND: Final = "robot_gateway_background"
 _PACED_MARKS: Final = ("pytest.mark.gst", "pytest.mark.docker")
-_PACED_FOLDERS: Final = ("/tests/integration/drive/", "/tests/integration/gateway/teleop/")
+_DRIVING_FOLDERS: Final = ("/tests/integration/drive/", "/tests/integration/gateway/teleop/")
 
 _CONTAINERS: Final = "tests/e2e/containers/"
 _STAND_INS: Final = tuple(
@@ -88,7 +89,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Marks what runs alone, and puts the longest files first."""
     for item in items:
         marks = {mark.name for mark in item.iter_markers()}
-        if "timed" in marks and ("docker" in marks or {"ros", "gst"} <= marks):
+        if "timed" in marks and ("docker" in marks or {"ros", "gst"} <= marks or _drives(item.path)):
             item.add_marker(pytest.mark.alone)
     items.sort(key=lambda item: _RANKS.get(_file_of(item.nodeid), len(_RANKS)))
 
@@ -197,10 +198,14 @@ def unit_of(file: str) -> str:
 @cache
 def is_paced(file: Path) -> bool:
     """Returns whether the file's tests run what fails where it gets no processor in time."""
-    if any(folder in file.as_posix() for folder in _PACED_FOLDERS):
+    if _drives(file):
         return True
     text = file.read_text(encoding="utf-8")
     return any(mark in text for mark in _PACED_MARKS)
+
+
+def _drives(file: Path) -> bool:
+    return any(folder in file.as_posix() for folder in _DRIVING_FOLDERS)
 
 
 def _file_of(nodeid: str) -> str:
