@@ -66,7 +66,7 @@ class S3Server:
 def s3_server(directory: Path) -> Iterator[S3Server]:
     """Serves when the block begins, gone when it ends."""
     server = S3Server(free_tcp_port(), directory)
-    command = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(server.port)]
+    command = [sys.executable, "-m", "tests.support.moto_server", "-H", "127.0.0.1", "-p", str(server.port)]
     with (directory / "s3.log").open("wb") as log:
         process = subprocess.Popen(command, stdout=log, stderr=log)
 

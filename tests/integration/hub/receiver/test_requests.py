@@ -199,14 +199,14 @@ async def test_beyond_eight_requests_at_once_it_is_busy(ground: Ground) -> None:
 
 async def test_abandoned_uploads_are_swept_by_two_at_once(ground: Ground) -> None:
     client, bucket = ground.server.client, ground.store.bucket
+    begun = datetime.now(UTC) - timedelta(seconds=1)
     for number in range(20):
         client.create_multipart_upload(Bucket=bucket, Key=f"{FLEET}/{ROBOT}/one/{number}")
     client.create_multipart_upload(Bucket=bucket, Key="another-fleet/r1/one/x")
-    store, now = Store(ground.store), datetime.now(UTC)
+    store, later = Store(ground.store), datetime.now(UTC) + timedelta(seconds=1)
     try:
-        # To moto, all uploads were begun in 2010.
-        assert sweep(store, f"{FLEET}/", datetime(2010, 1, 1, tzinfo=UTC)) == 0
-        await asyncio.gather(*(asyncio.to_thread(sweep, store, f"{FLEET}/", now) for _ in range(2)))
+        assert sweep(store, f"{FLEET}/", begun) == 0
+        await asyncio.gather(*(asyncio.to_thread(sweep, store, f"{FLEET}/", later) for _ in range(2)))
     finally:
         store.close()
     left = client.list_multipart_uploads(Bucket=bucket)["Uploads"]
