@@ -1,4 +1,4 @@
-"""A driver's lanes without a connection: what `console.client.driving` writes and reads on each."""
+"""A driver's lanes without a connection: what `console.client.drive_lanes` writes and reads on each."""
 
 import asyncio
 from collections import deque

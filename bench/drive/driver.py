@@ -24,7 +24,8 @@ from console.client import (
     DrivePhase,
     DriveSession,
     Supervision,
-    driving,
+    drive_lanes,
+    drive_session,
 )
 from console.client.mapping.driving import DriveCommand, command_request
 
@@ -124,7 +125,7 @@ async def drive(target: str, *, stay: bool) -> None:
         return command_request(command)
 
     by_eye = DriveOptions(supervision=Supervision.LINE_OF_SIGHT, input_device="bench")
-    with patch.object(driving, "command_request", noted):
+    with patch.object(drive_session, "command_request", noted):
         async with AsyncGatewayClient(target) as client, client.drive(by_eye) as session:
             driver = Driver(session, made_ns)
             jobs = [asyncio.create_task(job) for job in (driver.hold(), driver.record())]
@@ -145,10 +146,10 @@ async def drive(target: str, *, stay: bool) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("target")
-    parser.add_argument("--lanes", type=int, default=driving.LANES)
+    parser.add_argument("--lanes", type=int, default=drive_lanes.LANES)
     parser.add_argument("--stay", action="store_true")
     given = parser.parse_args()
-    with patch.object(driving, "LANES", given.lanes):
+    with patch.object(drive_lanes, "LANES", given.lanes):
         asyncio.run(drive(given.target, stay=given.stay))
 
 

@@ -13,7 +13,7 @@ value of `console.client.results` or raises a `GatewayError` that says what to d
 from console.client.aio import AsyncGatewayClient
 from console.client.blocking import GatewayClient
 from console.client.clock import Clock, Offset
-from console.client.driving import DriveOptions, DriveSession
+from console.client.drive_session import DriveOptions, DriveSession
 from console.client.errors import (
     Cancelled,
     DeadlineExceeded,

@@ -9,7 +9,7 @@ from typing import Self, TypeVar
 from common.tasks import cancel
 from console.client import results
 from console.client.clock import Clock, Offset
-from console.client.driving import DriveOptions, DriveSession
+from console.client.drive_session import DriveOptions, DriveSession
 from console.client.errors import DeadlineExceeded, Unreachable, Unsupported
 from console.client.event_feed import EventFeed
 from console.client.exporting import Export, ExportedRecording, ExportOptions, file_bytes, once_read

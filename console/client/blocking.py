@@ -7,7 +7,7 @@ from contextlib import suppress
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 from console.client.aio import AsyncGatewayClient
-from console.client.driving import DriveOptions, DriveSession
+from console.client.drive_session import DriveOptions, DriveSession
 from console.client.errors import Cancelled, GatewayError
 from console.client.loop_thread import LoopThread, shared_loop
 from console.client.options import ClientOptions

@@ -5,7 +5,7 @@ from typing import Final
 
 from common.findings import Finding, good, note, wrong
 from console.client import GatewayInfo, PreviewState, SystemStatus
-from console.client.driving import SENTENCES, stopped_by
+from console.client.drive_reasons import SENTENCES, stopped_by
 from console.client.results import (
     CloudState,
     DriveInhibit,

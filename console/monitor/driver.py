@@ -1,7 +1,7 @@
 """Driving from a window: the session, and what a driver or a viewer asks for besides it.
 
 The session lives in the worker's loop, so that a window that hangs sends nothing: what it held counts for
-100 ms (`console.client.driving.HOLD_COUNTS_S`), and the session itself goes on to send releases.
+100 ms (`console.client.drive_commands.HOLD_COUNTS_S`), and the session itself goes on to send releases.
 """
 
 import asyncio

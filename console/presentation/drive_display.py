@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from console.client import DrivePhase, DriveState, StopLatch, Supervision
-from console.client.driving import rest_reasons
+from console.client.drive_reasons import rest_reasons
 from console.client.results import DriveLimits, Teleop, TeleopState
 from console.presentation.formatting import joined, sentence
 from console.presentation.severity_style import DRIVE_STYLES, SeverityStyle

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from console.client.driving import SENTENCES, stopped_by
+from console.client.drive_reasons import SENTENCES, stopped_by
 from console.client.results import DriveInhibit, DrivePhase, Teleop
 from console.presentation.formatting import joined
 from console.presentation.severity_style import DRIVE_STYLES, SeverityStyle

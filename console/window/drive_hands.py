@@ -13,7 +13,7 @@ from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QGuiApplication, QKeyEvent
 from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QLineEdit, QPlainTextEdit, QTextEdit, QWidget
 
-from console.client.driving import HOLD_COUNTS_S
+from console.client.drive_commands import HOLD_COUNTS_S
 from console.monitor.driver import Driver
 from console.steering import LETTERS, Direction, Steering, steering_of
 

@@ -29,7 +29,7 @@ from console.client import (
     Overloaded,
     Refused,
 )
-from console.client.driving import LANES
+from console.client.drive_lanes import LANES
 from console.client.error_table import error_from
 from console.client.options import ClientOptions
 from console.client.transport import GrpcTransport
@@ -265,7 +265,7 @@ async def test_one_lane_may_go(robot: DrivenRobot, client: AsyncGatewayClient) -
         assert session.open_lanes == LANES, "from the beginning"
         await in_motion(session, robot.base, SPEED_MPS)
         # The test's own hand in the library: only there one lane can be cut.
-        session._tasks[1].cancel()
+        session._lanes._keepers[1].cancel()
         for _ in range(15):
             session.hold(SPEED_MPS)
             await asyncio.sleep(0.02)
@@ -283,7 +283,7 @@ def one_lane(
         session = client.drive(BY_EYE)
         targets = iter([robot.target])
         monkeypatch.setattr(
-            session,
+            session._lanes,
             "_connect",
             lambda: GrpcTransport(next(targets, address), ClientOptions(), Credentials()),
         )

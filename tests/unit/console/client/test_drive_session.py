@@ -9,15 +9,9 @@ from itertools import count
 import pytest
 
 from console.client.blocking import BlockingDriveSession
-from console.client.driving import (
-    COMMANDS_PER_S,
-    HOLD_COUNTS_S,
-    LANES,
-    MAX_UNACKNOWLEDGED,
-    DriveOptions,
-    DriveSession,
-    LaneItem,
-)
+from console.client.drive_commands import HOLD_COUNTS_S
+from console.client.drive_lanes import LANES, MAX_UNACKNOWLEDGED, LaneItem
+from console.client.drive_session import COMMANDS_PER_S, DriveOptions, DriveSession
 from console.client.errors import Refused, Unreachable
 from console.client.loop_thread import LoopThread
 from console.client.mapping.methods import Method
@@ -42,7 +36,7 @@ PATIENT_S = 60.0
 
 
 def have_holds_count_for(monkeypatch: pytest.MonkeyPatch, seconds: float) -> None:
-    monkeypatch.setattr("console.client.driving.HOLD_COUNTS_S", seconds)
+    monkeypatch.setattr("console.client.drive_commands.HOLD_COUNTS_S", seconds)
 
 
 @pytest.fixture(autouse=True)
@@ -227,11 +221,11 @@ async def test_no_hold_begins_before_the_release_has_left() -> None:
         robot.answers = False
 
         def holds_for(commands: int) -> Callable[[], bool]:
-            until_sequence = session._sequence + commands
+            until_sequence = session._commands.sequence + commands
 
             def enough() -> bool:
                 session.hold(SPEED_MPS)
-                return session._sequence > until_sequence
+                return session._commands.sequence > until_sequence
 
             return enough
 
@@ -268,7 +262,7 @@ async def test_what_ends_the_session_ends_the_hold() -> None:
         robot.ends_with = Refused("taken over")
         await until(lambda: session.error, "it has ended")
         assert session.error is robot.ends_with
-        assert session._hold is None
+        assert not session._commands.held
         with pytest.raises(Refused, match="taken over"):
             session.check()
 

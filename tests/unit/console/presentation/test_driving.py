@@ -2,11 +2,12 @@
 
 import pytest
 
-from console.client.driving import SENTENCES
+from console.client.drive_reasons import SENTENCES
 from console.client.mapping.methods import GET_SYSTEM_STATUS
 from console.client.results import DrivePhase
 from console.presentation.severity_style import DRIVE_STYLES, SeverityStyle
-from console.presentation.status_table import Row, View, table_rows
+from console.presentation.status_row import Row, View
+from console.presentation.status_table import table_rows
 from omniseer.gateway.v1 import states_pb2 as states
 from omniseer.gateway.v1 import system_status_pb2, teleop_pb2
 from tests.support.gateway_double import healthy_status

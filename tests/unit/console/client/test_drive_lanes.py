@@ -1,6 +1,6 @@
 """How many commands a lane holds that the robot has not acknowledged."""
 
-from console.client.driving import MAX_UNACKNOWLEDGED, OnTheirWay
+from console.client.drive_lanes import MAX_UNACKNOWLEDGED, OnTheirWay
 
 
 def test_a_lane_is_full_until_what_was_written_on_it_is_acknowledged() -> None:
