@@ -15,7 +15,8 @@ from console.cli.tables import STYLES, headline, rows_table
 from console.client import GatewayError, SystemStatus
 from console.presentation.formatting import age, plural
 from console.presentation.preview_switch import Note
-from console.presentation.status_table import View, table_rows
+from console.presentation.status_row import View
+from console.presentation.status_table import table_rows
 
 _GAP: Final = "   "
 

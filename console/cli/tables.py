@@ -10,7 +10,8 @@ from rich.text import Text
 from console.client.results import Detections, OverlaySnapshot, SystemStatus
 from console.presentation.formatting import age
 from console.presentation.severity_style import SeverityStyle
-from console.presentation.status_table import Row, View, table_rows
+from console.presentation.status_row import Row, View
+from console.presentation.status_table import table_rows
 
 STYLES: Final = {
     SeverityStyle.GOOD: "green",

@@ -8,8 +8,8 @@ from console.client.results import FaultSeverity, Freshness, RecordingCopyState,
 from console.fleet.model import FleetSummary, worst_fault
 from console.fleet.values import FleetRow, RobotState
 from console.presentation.formatting import UNKNOWN, age, joined, plural, quantity, size
+from console.presentation.measured_text import number_text
 from console.presentation.severity_style import FAULT_STYLES, HEALTH_STYLES, SeverityStyle
-from console.presentation.status_table import number_text
 from console.presentation.value_style import (
     CHARGE_PERCENT,
     DISK_PERCENT,

@@ -13,7 +13,8 @@ from console.presentation.severity_style import (
     PREVIEW_STYLES,
     SeverityStyle,
 )
-from console.presentation.status_table import Look, Row, number_rows, pose_rows, text_rows
+from console.presentation.status_row import Look, Row
+from console.presentation.status_table import number_rows, pose_rows, text_rows
 from fleet.standing import Standing
 
 _LONGEST_TEXT: Final = 200

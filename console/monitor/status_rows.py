@@ -9,7 +9,8 @@ from console.monitor.monitor_state import MonitorState
 from console.presentation.formatting import age, with_component
 from console.presentation.own_stream import OwnStream
 from console.presentation.severity_style import FAULT_STYLES, SeverityStyle
-from console.presentation.status_table import Row, View, table_rows
+from console.presentation.status_row import Row, View
+from console.presentation.status_table import table_rows
 
 _NO_FAULT: Final = Row("", "none", SeverityStyle.GOOD, "The robot reports no fault")
 _WAS_NO_FAULT: Final = Row("", "none", SeverityStyle.QUIET, "The robot reported no fault")

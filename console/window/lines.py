@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QVBoxLayout, QWi
 
 from console.presentation.preview_switch import Note
 from console.presentation.severity_style import SeverityStyle
-from console.presentation.status_table import Row
+from console.presentation.status_row import Row
 from console.window.labels import (
     TOP,
     PlainLabel,

@@ -10,7 +10,8 @@ from console.client.mapping.methods import GET_OVERLAY_SNAPSHOT, GET_SYSTEM_STAT
 from console.client.results import SystemStatus
 from console.presentation.severity_style import SeverityStyle
 from console.presentation.status_line import status_line
-from console.presentation.status_table import View, table_rows
+from console.presentation.status_row import View
+from console.presentation.status_table import table_rows
 from omniseer.gateway.v1 import overlay_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from omniseer.gateway.v1.fault_pb2 import FAULT_SEVERITY_ERROR

@@ -5,7 +5,7 @@ from console.fleet.model import ReportedState, fleet_rows
 from console.fleet.values import Enrolment, FleetRow
 from console.fleet.wire import state_of
 from console.presentation.severity_style import SeverityStyle
-from console.presentation.status_table import Row
+from console.presentation.status_row import Row
 from omniseer.fleet.v1.state_pb2 import RobotState
 from omniseer.gateway.v1 import fault_pb2, pose_pb2, value_pb2
 from tests.support.filled import fill

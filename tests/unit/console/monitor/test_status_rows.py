@@ -11,7 +11,7 @@ from console.monitor.monitor_state import MonitorState
 from console.monitor.status_rows import component_rows, fault_items, fault_rows, stream_rows
 from console.presentation.own_stream import OwnStream
 from console.presentation.severity_style import SeverityStyle
-from console.presentation.status_table import Row
+from console.presentation.status_row import Row
 from omniseer.gateway.v1 import fault_pb2, overlay_pb2
 from tests.support.snapshots import NOW_S, heard, snapshot
 

@@ -6,7 +6,8 @@ from console.client.mapping.methods import GET_SYSTEM_STATUS
 from console.client.results import RecordingCopy, RecordingCopyState
 from console.presentation.cloud import copy_text
 from console.presentation.severity_style import SeverityStyle
-from console.presentation.status_table import Row, View, table_rows
+from console.presentation.status_row import Row, View
+from console.presentation.status_table import table_rows
 from omniseer.gateway.v1 import cloud_pb2, recording_pb2
 from tests.support.gateway_double import healthy_status
 

@@ -6,7 +6,8 @@ import pytest
 
 from console.client.mapping.methods import GET_OVERLAY_SNAPSHOT
 from console.presentation.severity_style import SeverityStyle
-from console.presentation.status_table import Row, View, table_rows
+from console.presentation.status_row import Row, View
+from console.presentation.status_table import table_rows
 from omniseer.gateway.v1 import overlay_pb2, pose_pb2, source_pb2, value_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.gateway_double import healthy_status

@@ -5,7 +5,8 @@ from collections.abc import Callable
 import pytest
 
 from console.presentation.severity_style import SeverityStyle
-from console.presentation.status_table import Row, View, table_rows
+from console.presentation.status_row import Row, View
+from console.presentation.status_table import table_rows
 from console.presentation.value_style import CHARGE_PERCENT, WIFI_DBM, Judgement
 from omniseer.gateway.v1 import system_status_pb2
 from tests.support.snapshots import snapshot
