@@ -2,14 +2,18 @@
 
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import Final, Protocol
+
+from PySide6.QtWidgets import QWidget
 
 from console.presentation.preview_switch import PROFILES
+from console.window.arrangement import Arrangement
+from console.window.driving import Driving
 from console.window.keys import Key, full_screen_key
+from console.window.practice_band import PracticeBand
+from console.window.preview_actions import PreviewActions
+from console.window.recording_actions import RecordingActions
 from console.window.side_panel import TABS
-
-if TYPE_CHECKING:
-    from console.window.monitor_window import MonitorWindow
 
 KEYS_OF_THE_HANDS: Final = (
     Key(("Space",), "STOP, until it is reset (to type one: Shift+Space)", None),
@@ -20,39 +24,89 @@ KEYS_OF_THE_HANDS: Final = (
 _PROFILES = ("low bandwidth", "balanced", "high quality")
 
 
-def cockpit_keys(window: "MonitorWindow") -> Sequence[Key]:
-    """Returns every key of the window: each of its actions has one."""
+class Cockpit(Protocol):
+    """What the keys do, beside showing the window on the full screen and closing it."""
+
+    preview_actions: PreviewActions
+    recording: RecordingActions
+    driving: Driving
+    arrangement: Arrangement
+    band: PracticeBand | None
+
+    def acknowledge(self) -> None:
+        """Acknowledges all faults."""
+
+    def retry(self) -> None:
+        """Ends the pause before the next attempt to connect."""
+
+    def toggle_boxes(self) -> None:
+        """Shows or hides the boxes around objects."""
+
+    def toggle_sound(self) -> None:
+        """Turns the alarm's sound on or off."""
+
+    def toggle_help(self) -> None:
+        """Shows or hides the list of keys."""
+
+    def show_tab(self, number: int) -> None:
+        """Shows a tab of the side panel."""
+
+    def show_robots(self) -> None:
+        """Opens the list of robots."""
+
+    def search_events(self) -> None:
+        """Moves to the search for events."""
+
+    def save_picture(self) -> None:
+        """Saves the picture with its status."""
+
+    def export_events(self) -> None:
+        """Saves the listed events."""
+
+    def escape(self) -> None:
+        """Closes what lies over the picture."""
+
+
+def cockpit_keys(cockpit: Cockpit, window: QWidget) -> Sequence[Key]:
+    """Returns every key of the cockpit: each of its actions has one.
+
+    Args:
+        cockpit: has the actions.
+        window: it is in.
+    """
+    preview, recording = cockpit.preview_actions, cockpit.recording
+    driving, arrangement = cockpit.driving, cockpit.arrangement
     profiles = (
-        Key((str(number),), f"preview: {title}", partial(window.choose, profile))
+        Key((str(number),), f"preview: {title}", partial(preview.choose, profile))
         for number, (title, profile) in enumerate(zip(_PROFILES, PROFILES, strict=True), start=1)
     )
     tabs = (
-        Key((f"Ctrl+{number}",), f"tab {title}", partial(window.show_tab, number - 1))
+        Key((f"Ctrl+{number}",), f"tab {title}", partial(cockpit.show_tab, number - 1))
         for number, title in enumerate(TABS, start=1)
     )
-    practice = (Key(("N",), "practice: another network", window.band.choose_next),) if window.band else ()
+    practice = (Key(("N",), "practice: another network", cockpit.band.choose_next),) if cockpit.band else ()
     return (
         *practice,
-        Key(("P",), "preview on or off", window.switch),
+        Key(("P",), "preview on or off", preview.switch),
         *profiles,
-        Key(("V",), "preview: next camera", window.next_camera),
-        Key(("O",), "boxes around objects", window.toggle_boxes),
-        Key(("S",), "save the picture and its status", window.save_picture),
-        Key(("C",), "record, and stop recording", window.recording.record),
-        Key(("K",), "keep the last seconds", window.recording.keep),
-        Key(("T",), "drive, and end driving", window.driving.toggle),
-        Key(("Shift+R",), "reset the stop that is shown", window.driving.reset),
-        Key(("A",), "acknowledge all faults", window.acknowledge),
-        Key(("M",), "alarm sound on or off", window.toggle_sound),
-        Key(("R",), "retry to connect now", window.retry),
-        Key(("F",), "picture only, and back", window.toggle_picture_only),
+        Key(("V",), "preview: next camera", preview.next_camera),
+        Key(("O",), "boxes around objects", cockpit.toggle_boxes),
+        Key(("S",), "save the picture and its status", cockpit.save_picture),
+        Key(("C",), "record, and stop recording", recording.record),
+        Key(("K",), "keep the last seconds", recording.keep),
+        Key(("T",), "drive, and end driving", driving.toggle),
+        Key(("Shift+R",), "reset the stop that is shown", driving.reset),
+        Key(("A",), "acknowledge all faults", cockpit.acknowledge),
+        Key(("M",), "alarm sound on or off", cockpit.toggle_sound),
+        Key(("R",), "retry to connect now", cockpit.retry),
+        Key(("F",), "picture only, and back", arrangement.toggle_picture_only),
         full_screen_key(window, "F11"),
-        Key(("F9",), "side panel", window.toggle_panel),
+        Key(("F9",), "side panel", arrangement.toggle_panel),
         *tabs,
-        Key(("Ctrl+F",), "search in the events", window.search_events),
-        Key(("Ctrl+E",), "export the listed events", window.export_events),
-        Key(("Ctrl+R",), "another robot", window.show_robots),
-        Key(("Esc",), "close messages; back to the window", window.escape),
-        Key(("F1", "?"), "these keys", window.toggle_help),
+        Key(("Ctrl+F",), "search in the events", cockpit.search_events),
+        Key(("Ctrl+E",), "export the listed events", cockpit.export_events),
+        Key(("Ctrl+R",), "another robot", cockpit.show_robots),
+        Key(("Esc",), "close messages; back to the window", cockpit.escape),
+        Key(("F1", "?"), "these keys", cockpit.toggle_help),
         Key(("Q",), "quit", window.close),
     )

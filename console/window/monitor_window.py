@@ -9,7 +9,6 @@ from PySide6.QtCore import QTimer
 from PySide6.QtGui import QCloseEvent, QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QVBoxLayout, QWidget
 
-from console.client import PreviewProfile
 from console.monitor.alarm import Alarm, Occurrence
 from console.monitor.history import History, values_of
 from console.monitor.link import link_text
@@ -26,6 +25,7 @@ from console.robots.roster import RobotChoice, Roster
 from console.viewer.playback import PlaybackState
 from console.window import window_settings
 from console.window.alarm_sound import AlarmSound
+from console.window.arrangement import Arrangement, Parts
 from console.window.bottom_strip import BottomStrip
 from console.window.cockpit_keys import KEYS_OF_THE_HANDS, cockpit_keys
 from console.window.drive_hands import Pad
@@ -47,10 +47,6 @@ from console.window.window_settings import Choices
 
 _TICK_MS: Final = 400
 """Shorter than a slot of the plots, so that a late tick leaves no gap in a curve."""
-_WIDE_PX: Final = 1100
-"""From this width on, plots stand below the picture while the panel is open; else they are a tab."""
-_LEAST_PLOTS_PX: Final = 64
-_MOST_PLOTS_PX: Final = 170
 _SAVES_END_WITHIN_S: Final = 1.0
 
 
@@ -78,7 +74,7 @@ class MonitorWindow(QWidget):
     ) -> None:
         super().__init__()
         self._worker = worker
-        self._actions = PreviewActions(worker)
+        self.preview_actions = PreviewActions(self, worker)
         self.read_picture_age: Callable[[], PictureAge | None] = self.reported_age
         """Reads the age of the picture on the screen; by default from the robot's own report."""
         self.read_worst_age_ms: Callable[[], float | None] = lambda: None
@@ -103,7 +99,8 @@ class MonitorWindow(QWidget):
         self.driving = Driving(self, worker, self.strip, self.picture, pad)
         self.recording = RecordingActions(worker, self.side.recordings, self.picture)
         self.band = band
-        keys = cockpit_keys(self)
+        self.arrangement = Arrangement(self, Parts(self.header, self.side, self.plots, self.strip, video))
+        keys = cockpit_keys(self, self)
         self.picture.show_keys((*keys, *KEYS_OF_THE_HANDS))
         self.preview = self.strip.preview
         self.saver, self.sound = Saver(self, self.toasts.show_passing), AlarmSound(self.alarm, self)
@@ -114,11 +111,10 @@ class MonitorWindow(QWidget):
         bind_keys(self, keys)
         self.setWindowTitle("PRACTICE, no robot" if band else f"Robot {worker.target}")
         chosen = window_settings.restore(self)
-        self.alarm.sound_on = chosen.sound
+        self.arrangement.panel_open, self.alarm.sound_on = chosen.panel, chosen.sound
         if chosen.exports:
             self.recording.folder = Path(chosen.exports)
-        self._panel_open, self._picture_only = chosen.panel, False
-        self.arrange()
+        self.arrangement.arrange()
         self.refresh()
 
     def refresh(self) -> None:
@@ -130,7 +126,7 @@ class MonitorWindow(QWidget):
         stream = self.read_stream()
         self.header.show_state(state, link, now_s, self.read_picture_age(), frozen_s, stream=stream)
         self.banner.show_item(link)
-        controls = self._actions.controls(state, now_s)
+        controls = self.preview_actions.controls(state, now_s)
         self.preview.show_controls(controls)
         hidden = state.request is not None and state.request is self._dismissed
         self.toasts.show_answers(() if hidden else controls.answers)
@@ -146,26 +142,6 @@ class MonitorWindow(QWidget):
         self.sound.check(now_s)
 
     # Actions of the keys and buttons.
-
-    def switch(self) -> None:
-        """Turns the preview on or off."""
-        self._actions.switch()
-        self.refresh()
-
-    def choose(self, profile: PreviewProfile) -> None:
-        """Requests or selects a profile of the preview."""
-        self._actions.choose(profile)
-        self.refresh()
-
-    def choose_camera(self, name: str) -> None:
-        """Requests or selects a camera."""
-        self._actions.choose_camera(name)
-        self.refresh()
-
-    def next_camera(self) -> None:
-        """Requests or selects the next camera that works."""
-        self._actions.next_camera()
-        self.refresh()
 
     def retry(self) -> None:
         """Ends the pause before the next attempt to connect."""
@@ -185,25 +161,13 @@ class MonitorWindow(QWidget):
         """Shows or hides the boxes around objects."""
         self.video.show_overlay(not self.video.overlay_shown)
 
-    def toggle_panel(self) -> None:
-        """Opens or closes the side panel."""
-        self._panel_open, self._picture_only = not self.side.isVisible(), False
-        self.arrange()
-
-    def toggle_picture_only(self) -> None:
-        """Leaves the window to the picture, and back; the place of STOP stays where a robot can be driven."""
-        self._picture_only = not self._picture_only
-        self.arrange()
-
     def toggle_help(self) -> None:
         """Shows or hides the list of keys."""
         self.picture.key_help.toggle()
 
     def show_tab(self, number: int) -> None:
         """Shows a tab of the side panel, which is opened for it."""
-        if not self.side.isVisible():
-            self.toggle_panel()
-        self.side.show_tab(number)
+        self.arrangement.show_tab(number)
         if TABS[number] == "Recordings":
             self.recording.say_if_absent()
 
@@ -233,45 +197,23 @@ class MonitorWindow(QWidget):
             self._dismissed = request if request and not request.pending else None
             self.toasts.dismiss()
             self.refresh()
-        elif self._picture_only:
-            self.toggle_picture_only()
-        else:
+        elif not self.arrangement.end_picture_only():
             leave_full_screen(self)
-
-    def arrange(self) -> None:
-        """Shows the parts that this size and the operator's choices call for."""
-        only = self._picture_only
-        panel = self._panel_open and not only
-        self.header.setVisible(not only)
-        self.side.setVisible(panel)
-        self.strip.show_preview(not only)
-        self.header.panel_button.setChecked(panel)
-        below = panel and self.width() >= _WIDE_PX
-        self.side.show_plots_tab(not below)
-        self.plots.setVisible(below)
-        if below:
-            self.plots.setFixedHeight(self._room_for_plots())
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         """Arranges the parts for the new size."""
         super().resizeEvent(event)
-        self.arrange()
+        self.arrangement.arrange()
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
         """Ends driving, saves the settings, and waits for a file that is being written."""
         self.driving.close()
         self.header.name.end_search()
         self._timer.stop()
-        window_settings.save(self, Choices(self._panel_open, self.alarm.sound_on, str(self.recording.folder)))
+        choices = Choices(self.arrangement.panel_open, self.alarm.sound_on, str(self.recording.folder))
+        window_settings.save(self, choices)
         self.saver.job.wait(_SAVES_END_WITHIN_S)
         super().closeEvent(event)
-
-    def _room_for_plots(self) -> int:
-        """Returns the height that the picture's shape leaves below it, within bounds."""
-        width = self.width() - self.side.width()
-        height = self.height() - self.header.height() - self.strip.height()
-        left = height - width / self.video.shape
-        return round(max(_LEAST_PLOTS_PX, min(_MOST_PLOTS_PX, left)))
 
     def _lay_out(self) -> None:
         column = fill(QVBoxLayout(), (self.picture, 1), self.plots, spacing=0)
@@ -289,18 +231,19 @@ class MonitorWindow(QWidget):
         self._timer = QTimer(self, interval=_TICK_MS)
         self._timer.timeout.connect(self._tick)
         self._timer.start()
-        self.video.reshaped.connect(self.arrange)
-        self.strip.arranged.connect(self.arrange)
-        self.preview.switched.connect(self.switch)
-        self.preview.chosen.connect(self.choose)
-        self.preview.camera_chosen.connect(self.choose_camera)
+        self.video.reshaped.connect(self.arrangement.arrange)
+        self.strip.arranged.connect(self.arrangement.arrange)
+        self.preview_actions.acted.connect(self.refresh)
+        self.preview.switched.connect(self.preview_actions.switch)
+        self.preview.chosen.connect(self.preview_actions.choose)
+        self.preview.camera_chosen.connect(self.preview_actions.choose_camera)
         self.banner.retry.connect(self.retry)
         self.side.acknowledged.connect(self._acknowledge_one)
         self.side.acknowledge.clicked.connect(self._acknowledge_all)
         self.side.sound.clicked.connect(self.toggle_sound)
         self.side.events_tab.export_asked.connect(self.export_events)
         self.header.help_asked.connect(self.toggle_help)
-        self.header.panel_toggled.connect(self.toggle_panel)
+        self.header.panel_toggled.connect(self.arrangement.toggle_panel)
         self.header.name.chosen.connect(self._open_other)
         self.sound.job.done.connect(self._report_sound)
 

@@ -2,6 +2,8 @@
 
 import time
 
+from PySide6.QtCore import QObject, Signal
+
 from console.client import PreviewProfile
 from console.monitor.monitor_state import MonitorState
 from console.monitor.preview_controls import Controls, controls
@@ -9,14 +11,19 @@ from console.monitor.worker import Worker
 from console.presentation.preview_switch import next_camera
 
 
-class PreviewActions:
+class PreviewActions(QObject):
     """Sends the operator's requests, and remembers what was selected while the preview is off.
 
     Args:
+        parent: owns this object.
         worker: talks to the gateway.
     """
 
-    def __init__(self, worker: Worker) -> None:
+    acted = Signal()
+    """Something was requested or selected."""
+
+    def __init__(self, parent: QObject, worker: Worker) -> None:
+        super().__init__(parent)
         self._worker = worker
         self._selected: PreviewProfile | None = None
         self._selected_camera = ""
@@ -33,6 +40,7 @@ class PreviewActions:
         now = self._now()
         if now.enabled:
             self._worker.switch(now.toggled())
+            self.acted.emit()
 
     def choose(self, profile: PreviewProfile) -> None:
         """Requests a profile; while the preview is off, selects it for the next start."""
@@ -43,6 +51,7 @@ class PreviewActions:
             self._worker.switch(desired)
         else:
             self._selected = profile
+        self.acted.emit()
 
     def choose_camera(self, name: str) -> None:
         """Requests a camera; while the preview is off, selects it for the next start."""
@@ -53,6 +62,7 @@ class PreviewActions:
             self._worker.switch(desired)
         else:
             self._selected_camera = name
+        self.acted.emit()
 
     def next_camera(self) -> None:
         """Requests or selects the next camera that works."""

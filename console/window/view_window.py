@@ -31,7 +31,7 @@ class ViewWindow(QWidget):
     def __init__(self, robot: RobotVideo, video: VideoView) -> None:
         super().__init__()
         self.robot = robot
-        self._actions = PreviewActions(robot.worker)
+        self._actions = PreviewActions(self, robot.worker)
         self._counted = (time.monotonic(), 0)
         self.video = video
         self.figures, self.notes = ElidedLabel(), ElidedLabel()

@@ -75,7 +75,7 @@ def _cockpit(situation: str, directory: Path, file: Path) -> Mapping[str, Any]:
             until(lambda: not window.recording.absent, "the recorder")
             window.show_tab(TABS.index("Recordings"))
         if situation == "panel-closed":
-            window.toggle_panel()
+            window.arrangement.toggle_panel()
         let_pass(1.0)
         return {**_look(window, file), "maximised": window.isMaximized()}
 

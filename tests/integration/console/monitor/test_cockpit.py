@@ -426,7 +426,7 @@ def test_the_keys_are_shown(cockpit: Cockpit, key: Qt.Key) -> None:
 
 
 def test_every_key_of_the_list_is_bound_and_no_key_twice(cockpit: Cockpit) -> None:
-    listed = [name for key in cockpit_keys(cockpit.window) for name in key.names]
+    listed = [name for key in cockpit_keys(cockpit.window, cockpit.window) for name in key.names]
     bound = [each.key().toString() for each in cockpit.window.findChildren(QShortcut)]
     assert sorted(listed) == sorted(bound)
     assert len(set(listed)) == len(listed)

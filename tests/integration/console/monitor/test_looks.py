@@ -168,7 +168,7 @@ def open_and_close(change: tuple[int, int] | None = None) -> Left:
         if change:
             window.showNormal()
             window.resize(*change)
-            window.toggle_panel()
+            window.arrangement.toggle_panel()
             window.toggle_sound()
             let_pass(0.1)
         size = (window.width(), window.height())

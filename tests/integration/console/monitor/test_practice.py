@@ -201,7 +201,7 @@ def test_it_is_marked_and_no_robots_window_is(seat: Seat) -> None:
     assert band
     assert seat.window.windowTitle().startswith("PRACTICE, no robot")
     assert band.word.text() == "PRACTICE"
-    seat.window.toggle_picture_only()
+    seat.window.arrangement.toggle_picture_only()
     let_pass(0.1)
     assert band.isVisible(), "whatever else is hidden"
     with resting_robot() as pretender:
