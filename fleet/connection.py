@@ -15,7 +15,7 @@ What runs for long (`follow`, `pull`, `serve`) outlives the sessions.
 
 import asyncio
 import random
-from collections.abc import AsyncGenerator, Awaitable, Callable
+from collections.abc import AsyncGenerator
 from contextlib import aclosing, asynccontextmanager
 from dataclasses import dataclass
 from enum import Enum
@@ -25,19 +25,18 @@ from typing import Any, Final
 from common.backoff import Backoff
 from common.broadcast import Broadcast
 from common.tasks import cancel
-from fleet import consuming, names
+from fleet import consuming
 from fleet.consuming import Delivery, Start
 from fleet.errors import HubError, HubReason, RefusedError, UnreachableError, api_error, is_repeat
-from fleet.session import Message, Session, parsed
+from fleet.serving import Handler, Service, serve_in
+from fleet.session import NO_RESPONDERS, Message, Session, parsed
 
-__all__ = ["Delivery", "Entry", "FleetAddress", "Hub", "Link", "Published", "Request", "Start", "connect"]
+__all__ = ["Delivery", "Entry", "FleetAddress", "Hub", "Link", "Published", "Start", "connect"]
 
 FIRST_PAUSE_S: Final = 1.0
 LONGEST_PAUSE_S: Final = 60.0
 REQUEST_TIMEOUT_S: Final = 5.0
 """For an answer of the hub. A stream elects a leader in about that time."""
-_ROUTED: Final = "_R_."
-"""Reply subjects that the server makes for a request from another account; clients can't name such a one."""
 _STEADY_S: Final = 10.0
 """A connection that stood this long was a success: the next pause is short again."""
 
@@ -112,52 +111,13 @@ class Entry:
     pending: int
 
 
-class Request:
-    """A request of a robot, or of a person about one; the answers go to its sender.
-
-    Attributes:
-        robot: by the subject, which the hub enforces.
-        name: last part of the subject: "begin_file".
-        payload: as sent.
-    """
-
-    def __init__(self, robot: str, name: str, payload: bytes, session: Session, reply: str) -> None:
-        self.robot = robot
-        self.name = name
-        self.payload = payload
-        self._session = session
-        self._reply = reply
-
-    async def respond(self, payload: bytes) -> None:
-        """Sends an answer; there may be several.
-
-        Raises:
-            HubError: it can't be sent.
-        """
-        await self._session.publish(self._reply, payload)
-
-
-Handler = Callable[[Request], Awaitable[None]]
-
-
-@dataclass(frozen=True, slots=True)
-class _Service:
-    subject: str
-    queue: str
-    handler: Handler
-    at_once: int
-    of_one: int
-    busy: bytes
-    of_people: bool
-
-
 class Hub:
     """The hub as seen from one program. Made by `connect`."""
 
     def __init__(self, address: FleetAddress) -> None:
         self._address = address
         self._session: Session | None = None
-        self._services: list[_Service] = []
+        self._services: list[Service] = []
         self._calls: set[asyncio.Task[None]] = set()
         self._link = Link(False, "", None, "", asyncio.get_running_loop().time(), 0)
         self.changed = Broadcast()
@@ -316,7 +276,7 @@ class Hub:
             await session.send(subject, payload, reply)
             while True:
                 message = await waiter.get(silence_s)
-                if message.status == "503" and not message.payload:
+                if message.status == NO_RESPONDERS and not message.payload:
                     raise HubError(HubReason.NO_RESPONDERS, f"no program at the hub takes {subject}")
                 yield message.payload
 
@@ -346,10 +306,10 @@ class Hub:
             busy: answer to requests beyond that.
             of_people: whether they are those of people, who share an account with this program.
         """
-        service = _Service(subject, queue, handler, at_once, of_one or at_once, busy, of_people)
+        service = Service(subject, queue, handler, at_once, of_one or at_once, busy, of_people)
         self._services.append(service)
         if self._session is not None:
-            await self._serve_in(self._session, service)
+            await serve_in(self._session, service, self._calls)
 
     async def api(
         self, call: str, request: Any = None, timeout_s: float = REQUEST_TIMEOUT_S
@@ -417,7 +377,7 @@ class Hub:
     async def _use(self, session: Session) -> None:
         try:
             for service in self._services:
-                await self._serve_in(session, service)
+                await serve_in(session, service, self._calls)
         except HubError as error:
             self._set(False, "", error)
             return
@@ -457,27 +417,6 @@ class Hub:
             backoff.next_s() * random.uniform(0.5, 1.0),  # noqa: S311
         )
 
-    async def _serve_in(self, session: Session, service: _Service) -> None:
-        running: dict[asyncio.Task[None], str] = {}
-        """With the robot."""
-
-        async def on_message(message: Message) -> None:
-            parts = message.subject.split(".")
-            if len(parts) < 3 or not message.reply.startswith(_inboxes(service, parts[1])):
-                return
-            request = Request(parts[1], parts[-1], message.payload, session, message.reply)
-            of_robot = sum(robot == request.robot for robot in running.values())
-            if len(running) >= service.at_once or of_robot >= service.of_one:
-                await request.respond(service.busy)
-                return
-            task = asyncio.ensure_future(service.handler(request))
-            running[task] = request.robot
-            self._calls.add(task)
-            task.add_done_callback(running.pop)
-            task.add_done_callback(self._calls.discard)
-
-        await session.subscribe(service.subject, service.queue, on_message)
-
 
 @asynccontextmanager
 async def connect(address: FleetAddress) -> AsyncGenerator[Hub, None]:
@@ -489,13 +428,6 @@ async def connect(address: FleetAddress) -> AsyncGenerator[Hub, None]:
     finally:
         await cancel([supervisor])
         await hub.close()
-
-
-def _inboxes(service: _Service, robot: str) -> tuple[str, ...]:
-    """Returns where the answer to a request may go."""
-    if service.of_people:
-        return (f"{names.INBOXES}.",)
-    return (f"{names.inbox_prefix(robot)}.", _ROUTED)
 
 
 def acknowledged(message: Message) -> None:

@@ -4,7 +4,7 @@ from typing import Final, TypeVar
 
 from google.protobuf.message import DecodeError, Message
 
-from fleet.names import ROBOT_NAME
+from fleet.names import LARGEST_MESSAGE, ROBOT_NAME
 from omniseer.fleet.v1.command_pb2 import CommandResult
 from omniseer.fleet.v1.event_pb2 import EventBatch, EventItem
 from omniseer.fleet.v1.state_pb2 import RobotState
@@ -12,9 +12,6 @@ from omniseer.fleet.v1.upload_pb2 import StoredRecording, UploadResponse
 
 LARGEST_STATE: Final = 64 * 1024
 """Bytes of a state; one with everything in it has about 4 KiB."""
-LARGEST_MESSAGE: Final = 1024 * 1024
-"""Bytes of any other message: `max_payload` of the hub's servers."""
-
 LARGEST_ENTRY: Final = 4 * 1024 * 1024
 """Bytes of a recording's own entry in the store; a receiver makes none that is larger."""
 

@@ -13,10 +13,11 @@ from common import bind, rpc
 from common.health import Health
 from common.metrics_endpoint import serving_metrics
 from common.tasks import first_to_end
-from fleet.connection import FleetAddress, Handler, Hub, Request, connect
+from fleet.connection import FleetAddress, Hub, connect
 from fleet.errors import HubError
 from fleet.names import READING_SUBJECTS, RECEIVERS, UPLOAD_SUBJECTS
 from fleet.receipt_keys import read_public_keys, read_signer
+from fleet.serving import Handler, Request
 from hub.receiver.config import ReceiverSettings
 from hub.receiver.metrics import ReceiverMetrics
 from hub.receiver.service import THREADS, Party, ReceiverService, busy

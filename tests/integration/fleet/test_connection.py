@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 
 from fleet import names
-from fleet.connection import FleetAddress, Published, Request, Start, connect
+from fleet.connection import FleetAddress, Published, Start, connect
 from fleet.consuming import pull
 from fleet.errors import HubError, HubReason, UnreachableError
+from fleet.serving import Request
 from fleet.session import Message, Session
 from hub import streams
 from tests.support.free import free_tcp_port

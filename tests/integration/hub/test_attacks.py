@@ -9,8 +9,9 @@ from dataclasses import replace
 import pytest
 
 from fleet import names
-from fleet.connection import FleetAddress, Hub, Published, Request, connect
+from fleet.connection import FleetAddress, Hub, Published, connect
 from fleet.errors import HubError, HubReason, RefusedError
+from fleet.serving import Request
 from fleet.session import Session
 from hub import administration
 from tests.support.nats_servers import DEBIAN_SERVER, SERVER

@@ -7,9 +7,10 @@ from random import Random
 import pytest
 
 from bridge.uploads.queue import State
-from fleet.connection import Request, connect
+from fleet.connection import connect
 from fleet.names import RECEIVERS, UPLOAD_SUBJECTS
 from fleet.receipt_keys import read_signer
+from fleet.serving import Request
 from hub.receiver.service import THREADS, Party, ReceiverService
 from hub.receiver.store import Store
 from omniseer.fleet.v1.upload_pb2 import UploadResponse
