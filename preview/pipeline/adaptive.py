@@ -1,7 +1,8 @@
 """Adaptive bit rate: delay-based congestion control. Pure.
 
 Without viewers the bit rate is the profile's target. With the first one, of whose link nothing is known, it
-starts low and doubles about once a second, up to the target or the first sign of a queue (slow start).
+starts low and doubles about once a second, up to the target or until a queue begins; then it takes the last
+step back (slow start, ended as by HyStart++, RFC 9406).
 
 A congested link shows in a delay that is longer than its minimum (queue_delay.py): the age of the pictures
 where viewers report it, and the round-trip time. Then the bit rate falls at once, to below the rate that was
@@ -14,6 +15,7 @@ steps. The principle is that of Google Congestion Control (draft-ietf-rmcat-gcc)
 and docs/benchmarks.md (video.adaptive_*) has what they achieve.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
@@ -43,10 +45,12 @@ _PASSED: Final = 1.1
 """... until this share of it, where that rate is forgotten."""
 _SMALL_STEP: Final = 0.025
 """As a share of the bit rate."""
-_START_KBPS: Final = 1200
+_START_KBPS: Final = 800
 """For the first viewer, whose link is not known: what that does not carry would make pictures old."""
 _PROBE_STEP: Final = 1.5
-"""Step up in every window until the first sign of a queue, as a factor."""
+"""Step up until a queue begins, as a factor ..."""
+_PROBE_SHOWS_S: Final = 1.0
+"""... that shows in the round trip after this time: encoder and its average take half of it each."""
 _REMEMBERED_S: Final = 10.0
 """Without viewers; the next one's link is then not known."""
 _FIRST_WAIT_S: Final = 4.0
@@ -149,6 +153,8 @@ class BitrateController:
         """Since when the bit rate is close to the one that congested the link."""
         self._known = self._probing = False
         """Whether anything is known of the viewers' links; whether they have carried all so far."""
+        self._carried_kbps: int | None = None
+        """In the slow start: the bit rate before the last step."""
         self._decision = Decision(target_kbps)
         self.retarget(target_kbps, floor_kbps)
 
@@ -192,7 +198,8 @@ class BitrateController:
         elif now - self._viewed_at >= _REMEMBERED_S:
             # Before that, a viewer whose pictures have become too old joins anew, over the same link.
             self._forget_congestion()
-            self._known = self._probing = False
+            self._known = False
+            self._end_start()
             self._decision = Decision(self._target_kbps)
         if self._decision.bitrate_kbps < self._floor_kbps:
             self._decision = Decision(
@@ -200,10 +207,11 @@ class BitrateController:
             )
         return self._decision
 
-    def is_overwhelmed(self, rtts_ms: Mapping[str, float], now: float) -> bool:
-        """Whether the link has become so narrow that the end of the window is too late for a decision.
+    def is_urgent(self, rtts_ms: Mapping[str, float], now: float) -> bool:
+        """Whether the end of the window is too late for a decision.
 
-        That decision sets half of the delivered rate: what was lost meanwhile has to pass the link as well.
+        In the slow start it is once a queue begins. Later it is where the link has become much narrower: that
+        decision sets half of the delivered rate, because what was lost meanwhile has to pass it as well.
 
         Args:
             rtts_ms: round-trip times now, by the viewers' addresses.
@@ -215,7 +223,8 @@ class BitrateController:
             return False
         known = [each for each in rtts_ms if each in self._viewers]
         self._overwhelmed = any(self._viewers[each].rtt.leaps_to(rtts_ms[each]) for each in known)
-        return self._overwhelmed
+        begins = any(self._viewers[each].rtt.begins_at(rtts_ms[each]) for each in known)
+        return self._overwhelmed or (begins and self._carried_kbps is not None)
 
     def _follow(self, sample: Sample, now: float, *, joined: bool) -> None:
         """Changes the bit rate as far as the links require or permit it."""
@@ -224,11 +233,14 @@ class BitrateController:
             held = now - self._last_decrease_at < _HOLD_AFTER_DECREASE_S and not self._overwhelmed
             if not held and not self._is_draining():
                 self._decrease(", ".join(signs), sample.stream_kbps, now)
+        elif self._carried_kbps is not None and (queues := self._beginning_queues()):
+            self._step_back(self._carried_kbps, max(queues), now)
         elif not all(delay.is_calm for delay in self._delays()):
             self._calm_since = None
         elif self._probing:
-            if not joined:  # Otherwise the window has begun without a viewer.
-                self._probe()
+            # A window may have begun without a viewer, or before the last step.
+            if not joined and now - self._last_increase_at >= _PROBE_SHOWS_S:
+                self._probe(now)
         else:
             self._calm_since = now if self._calm_since is None else self._calm_since
             if self._may_increase(now):
@@ -279,6 +291,11 @@ class BitrateController:
             signs.insert(0, (self._age.is_long, f"pictures {self._age.delay_ms:.0f} ms old"))
         return [text for bad, text in signs if bad]
 
+    def _beginning_queues(self) -> list[float]:
+        """Returns the round-trip times that show that a queue begins."""
+        rtts = [viewer.rtt for viewer in self._viewers.values()]
+        return [rtt.delay_ms for rtt in rtts if rtt.begins_at(rtt.delay_ms)]
+
     def _is_draining(self) -> bool:
         """Whether the last decrease was enough: every queue that is left becomes shorter."""
         queues = [delay for delay in self._delays() if delay.is_long]
@@ -302,7 +319,7 @@ class BitrateController:
         self._wait_s = min(_LONGEST_WAIT_S, self._wait_s * 2 if self._close_since else self._wait_s)
         self._close_since = None
         self._last_decrease_at = now
-        self._probing = False
+        self._end_start()
         if after < before:
             self._decision = Decision(after, f"{signs}: {bit_rate(before)} -> {bit_rate(after)}")
         elif after < self._target_kbps:
@@ -313,13 +330,29 @@ class BitrateController:
         self._forget_congestion()
         self._known = True
         start_kbps = max(self._floor_kbps, min(self._target_kbps, max(_START_KBPS, proven_kbps)))
-        self._probing = start_kbps < self._target_kbps
+        self._probing, self._carried_kbps = start_kbps < self._target_kbps, None
         self._decision = Decision(start_kbps)
 
-    def _probe(self) -> None:
-        after = min(self._target_kbps, round(self._decision.bitrate_kbps * _PROBE_STEP))
-        self._probing = after < self._target_kbps
-        self._decision = Decision(after)
+    def _probe(self, now: float) -> None:
+        """Takes the next step of the slow start; at the target it ends when a window has carried it."""
+        before = self._decision.bitrate_kbps
+        if before == self._target_kbps:
+            self._end_start()
+            return
+        self._carried_kbps, self._last_increase_at = before, now
+        self._decision = Decision(min(self._target_kbps, round(before * _PROBE_STEP)))
+
+    def _step_back(self, carried_kbps: int, rtt_ms: float, now: float) -> None:
+        """Ends the slow start at the last bit rate without a queue; what the link carries is above it."""
+        before = self._decision.bitrate_kbps
+        self._congested_kbps = math.sqrt(carried_kbps * before)
+        self._last_decrease_at, self._calm_since = now, None
+        self._end_start()
+        text = f"RTT {rtt_ms:.0f} ms: {bit_rate(before)} -> {bit_rate(carried_kbps)}"
+        self._decision = Decision(carried_kbps, text)
+
+    def _end_start(self) -> None:
+        self._probing, self._carried_kbps = False, None
 
     def _may_increase(self, now: float) -> bool:
         return (

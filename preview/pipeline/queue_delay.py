@@ -13,6 +13,8 @@ _FALL_MS: Final = 5.0
 """Smaller changes between two observations say nothing about a queue."""
 _LEAP: Final = 2.0
 """Of the delay that counts as long."""
+_BEGINNING_MS: Final = 20.0
+"""A little more than the longest that HyStart++ takes (RFC 9406 4.3), because radio links jitter."""
 
 
 class QueueDelay:
@@ -62,6 +64,10 @@ class QueueDelay:
         lowest_ms = self._lowest_ms
         falls = delay_ms < self.delay_ms - _FALL_MS
         return lowest_ms is not None and not falls and delay_ms - lowest_ms > _LEAP * self._limit_ms
+
+    def begins_at(self, delay_ms: float) -> bool:
+        """Whether a delay shows that a queue begins, where the rate has just been raised by much."""
+        return self._lowest_ms is not None and delay_ms - self._lowest_ms > _BEGINNING_MS
 
     @property
     def is_draining(self) -> bool:

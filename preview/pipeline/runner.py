@@ -327,14 +327,14 @@ class Runner:
             if self._camera.name is None:
                 watchdogs = Watchdogs(now, self._timeouts)  # The next camera's time begins when it is live.
             self._picture_age.note_newest(self._framing.last_frame_age_ms, now)
-            if now - reading.at >= _WINDOW_S or self._is_overwhelmed(now):
+            if now - reading.at >= _WINDOW_S or self._is_urgent(now):
                 reading = self._measure(reading)
 
-    def _is_overwhelmed(self, now: float) -> bool:
+    def _is_urgent(self, now: float) -> bool:
         """Whether the bit rate can't wait for the end of the window."""
         if self._driver.sets_bitrate:
             return False
-        return self._controller.is_overwhelmed(statistics.read(self._framing, self._listener).rtts_ms, now)
+        return self._controller.is_urgent(statistics.read(self._framing, self._listener).rtts_ms, now)
 
     def _measure(self, before: statistics.Reading) -> statistics.Reading:
         now = statistics.read(self._framing, self._listener)

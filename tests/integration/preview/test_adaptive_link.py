@@ -18,7 +18,7 @@ def test_the_first_viewer_gets_a_low_rate_first_and_soon_the_target(tmp_path: Pa
         preview.enable(pb.PROFILE_BALANCED)
         assert preview.running().stream.target_bitrate_kbps == 2500
         with Watcher(preview.port) as watcher:
-            preview.wait_for(lambda a: a.stream.target_bitrate_kbps == 1200, "the start")
+            preview.wait_for(lambda a: a.stream.target_bitrate_kbps == 800, "the start")
             stream = preview.wait_for(lambda a: a.stream.target_bitrate_kbps == 2500, "the target").stream
             assert stream.bitrate_reason == ""
             watcher.wait_for_frames(30)
