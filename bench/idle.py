@@ -11,7 +11,7 @@ from bench.progress import log
 from bench.rows import FEWEST_ROUNDS, Row
 from bench.video.viewing import PATIENCE_S, watch
 from console.client import PreviewProfile
-from console.receiver.address import StreamAddress
+from console.viewer.redial import address_of
 from tests.support.receiver import Receiver
 
 SETTLE_S: Final = 5.0
@@ -68,10 +68,10 @@ def _rows(running: Product, state: str) -> list[Row]:
 
 
 def _preview_on_and_off(running: Product) -> None:
-    endpoint = running.client.enable_preview(PreviewProfile.BALANCED).preview.endpoint
-    if endpoint is None:
+    address = address_of(running.client.enable_preview(PreviewProfile.BALANCED).preview)
+    if address is None:
         raise RuntimeError("the preview does not run")
-    with Receiver(StreamAddress(endpoint.host, endpoint.port, endpoint.latency_ms), queue_size=4) as viewer:
+    with Receiver(address, queue_size=4) as viewer:
         viewer.next_frame(PATIENCE_S)
         watch(viewer, _WATCHED_S)
     running.client.disable_preview()
