@@ -8,9 +8,23 @@ REMARKS: Final[Mapping[tuple[str, ...], str]] = {
         "Fast DDS needs about 10 microseconds for each message that arrives, in its own threads, taken or"
         " not. That grows with the rate; the thread that samples needs the same at any."
     ),
+    ("ros.gateway_cpu", "cli.status_ms"): (
+        "bars on the value itself, which grows where the processor is slow. On the one that these figures are"
+        " of, an empty Python program takes 67 ms."
+    ),
+    ("ros.value_latency_ms",): (
+        "a value waits up to 50 ms for the sampler (20 Hz) and up to 10 ms for the cached response. The bar"
+        " is the sum of the two and leaves nothing for the call itself."
+    ),
     ("watch.p99_healthy", "status.p99"): (
         "callers and gateway share the cores of one machine. Where other programs take these, both rows rise"
-        " beyond their bars."
+        " beyond their bars. In `watch.p99_healthy` the clients of the load do so: 100 watchers, and one that"
+        " floods, with the priority of the caller that is measured."
+    ),
+    ("export.throughput", "export.status_p99_unlimited"): (
+        "an export passes two programs, recorder and gateway, where the reference passes one. Without a limit"
+        " and over loopback it takes all that the processors have; `export.status_p99` has the limit that"
+        " leaves a status its time."
     ),
     ("video.cpu", "video.cpu_in_turns"): (
         "what is above the reference is Python once per frame (`preview/pipeline/framing.py`), and the hop"
