@@ -1,8 +1,8 @@
 """Adaptive bit rate: delay-based congestion control. Pure.
 
 Without viewers the bit rate is the profile's target. With the first one, of whose link nothing is known, it
-starts low and doubles about once a second, up to the target or until a queue begins; then it takes the last
-step back (slow start, ended as by HyStart++, RFC 9406).
+starts low and rises by half about once a second, up to the target or until a queue begins; then it takes the
+last step back (slow start, ended as by HyStart++, RFC 9406).
 
 A congested link shows in a delay that is longer than its minimum (queue_delay.py): the age of the pictures
 where viewers report it, and the round-trip time. Then the bit rate falls at once, to below the rate that was
@@ -50,7 +50,7 @@ _START_KBPS: Final = 800
 _PROBE_STEP: Final = 1.5
 """Step up until a queue begins, as a factor ..."""
 _PROBE_SHOWS_S: Final = 1.0
-"""... that shows in the round trip after this time: encoder and its average take half of it each."""
+"""... that shows in the round trip after this time: the encoder follows late, and SRT reports an average."""
 _REMEMBERED_S: Final = 10.0
 """Without viewers; the next one's link is then not known."""
 _FIRST_WAIT_S: Final = 4.0
@@ -151,10 +151,10 @@ class BitrateController:
         """Before the next attempt to exceed it."""
         self._close_since: float | None = None
         """Since when the bit rate is close to the one that congested the link."""
-        self._known = self._probing = False
-        """Whether anything is known of the viewers' links; whether they have carried all so far."""
+        self._known = False
+        """Whether anything is known of the viewers' links."""
         self._carried_kbps: int | None = None
-        """In the slow start: the bit rate before the last step."""
+        """In the slow start: the bit rate before the last step, 0 before the first; None after it."""
         self._decision = Decision(target_kbps)
         self.retarget(target_kbps, floor_kbps)
 
@@ -198,8 +198,7 @@ class BitrateController:
         elif now - self._viewed_at >= _REMEMBERED_S:
             # Before that, a viewer whose pictures have become too old joins anew, over the same link.
             self._forget_congestion()
-            self._known = False
-            self._end_start()
+            self._known, self._carried_kbps = False, None
             self._decision = Decision(self._target_kbps)
         if self._decision.bitrate_kbps < self._floor_kbps:
             self._decision = Decision(
@@ -223,8 +222,9 @@ class BitrateController:
             return False
         known = [each for each in rtts_ms if each in self._viewers]
         self._overwhelmed = any(self._viewers[each].rtt.leaps_to(rtts_ms[each]) for each in known)
-        begins = any(self._viewers[each].rtt.begins_at(rtts_ms[each]) for each in known)
-        return self._overwhelmed or (begins and self._carried_kbps is not None)
+        if self._overwhelmed or not self._carried_kbps:
+            return self._overwhelmed
+        return any(self._viewers[each].rtt.begins_at(rtts_ms[each]) for each in known)
 
     def _follow(self, sample: Sample, now: float, *, joined: bool) -> None:
         """Changes the bit rate as far as the links require or permit it."""
@@ -233,11 +233,11 @@ class BitrateController:
             held = now - self._last_decrease_at < _HOLD_AFTER_DECREASE_S and not self._overwhelmed
             if not held and not self._is_draining():
                 self._decrease(", ".join(signs), sample.stream_kbps, now)
-        elif self._carried_kbps is not None and (queues := self._beginning_queues()):
+        elif self._carried_kbps and (queues := self._beginning_queues()):
             self._step_back(self._carried_kbps, max(queues), now)
         elif not all(delay.is_calm for delay in self._delays()):
             self._calm_since = None
-        elif self._probing:
+        elif self._carried_kbps is not None:
             # A window may have begun without a viewer, or before the last step.
             if not joined and now - self._last_increase_at >= _PROBE_SHOWS_S:
                 self._probe(now)
@@ -318,8 +318,7 @@ class BitrateController:
         after = max(self._floor_kbps, round(self._congested_kbps * share))
         self._wait_s = min(_LONGEST_WAIT_S, self._wait_s * 2 if self._close_since else self._wait_s)
         self._close_since = None
-        self._last_decrease_at = now
-        self._end_start()
+        self._last_decrease_at, self._carried_kbps = now, None
         if after < before:
             self._decision = Decision(after, f"{signs}: {bit_rate(before)} -> {bit_rate(after)}")
         elif after < self._target_kbps:
@@ -330,14 +329,14 @@ class BitrateController:
         self._forget_congestion()
         self._known = True
         start_kbps = max(self._floor_kbps, min(self._target_kbps, max(_START_KBPS, proven_kbps)))
-        self._probing, self._carried_kbps = start_kbps < self._target_kbps, None
+        self._carried_kbps = 0 if start_kbps < self._target_kbps else None
         self._decision = Decision(start_kbps)
 
     def _probe(self, now: float) -> None:
         """Takes the next step of the slow start; at the target it ends when a window has carried it."""
         before = self._decision.bitrate_kbps
         if before == self._target_kbps:
-            self._end_start()
+            self._carried_kbps = None
             return
         self._carried_kbps, self._last_increase_at = before, now
         self._decision = Decision(min(self._target_kbps, round(before * _PROBE_STEP)))
@@ -346,13 +345,9 @@ class BitrateController:
         """Ends the slow start at the last bit rate without a queue; what the link carries is above it."""
         before = self._decision.bitrate_kbps
         self._congested_kbps = math.sqrt(carried_kbps * before)
-        self._last_decrease_at, self._calm_since = now, None
-        self._end_start()
+        self._last_decrease_at, self._calm_since, self._carried_kbps = now, None, None
         text = f"RTT {rtt_ms:.0f} ms: {bit_rate(before)} -> {bit_rate(carried_kbps)}"
         self._decision = Decision(carried_kbps, text)
-
-    def _end_start(self) -> None:
-        self._probing, self._carried_kbps = False, None
 
     def _may_increase(self, now: float) -> bool:
         return (
