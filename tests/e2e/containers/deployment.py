@@ -174,7 +174,9 @@ def deployed(
                 compose.start()
             yield deployment
         except BaseException:
-            sys.stderr.write(deployment.run("logs", "--tail", "100", check=False).stdout)
+            # One after the other: together, the engine mixes their lines.
+            for service in deployment.run("ps", "--all", "--services", check=False).stdout.split():
+                sys.stderr.write(deployment.run("logs", "--tail", "100", service, check=False).stdout)
             raise
         finally:
             deployment.run("down", "--volumes", "--timeout", "5", check=False)

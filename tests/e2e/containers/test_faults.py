@@ -130,6 +130,7 @@ def test_without_a_gateway_the_preview_stops_by_itself(tmp_path: Path) -> None:
         assert demo.preview_port in udp_ports(demo, "preview")
         demo.run("stop", "gateway")
         # The unit test asserts in virtual time how long it takes; here the engine may be busy.
+        wait_until(lambda: "the preview stopped by itself" in demo.logs("preview"), "it stops", 60)
         wait_until(lambda: demo.preview_port not in udp_ports(demo, "preview"), "the port is free", 60)
 
 
