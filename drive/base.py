@@ -172,7 +172,9 @@ class Base:
             base_present=not self._problems,
             outranked=self._outranking.outranked(now_ns) if self._outranking else False,
             still=self._still[1] if self._still and fresh else None,
-            sources_known=self._other_sources.known(now_ns),
+            sources_known=self._other_sources.known(
+                now_ns, self._outranking.foreign_motion_ns if self._outranking else 0
+            ),
             commanded_on=self._other_sources.commanding(now_ns),
         )
 

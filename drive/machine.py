@@ -206,10 +206,13 @@ def reset_obstacle(state: State, now_ns: int) -> str:
             f"another source commands motion on {topics}, and would move the robot: "
             "end that first, or begin to drive, which keeps it away, and reset the stop then"
         )
-    if state.lease is None and not surroundings.sources_known:
-        return "it is not known yet, so soon after the start, what else commands the robot: try again in 3 s"
     if surroundings.outranked:
         return "another source moves the robot: end that first"
+    if state.lease is None and not surroundings.sources_known:
+        return (
+            "it is not known yet what else commands the robot, so soon after the start or after another "
+            "source has moved it: try again in 3 s"
+        )
     return ""
 
 

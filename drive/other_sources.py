@@ -20,7 +20,7 @@ _MOST: Final = 16
 """Inputs that are listened to; any more are a mistake of the graph."""
 _LOOK_EVERY_NS: Final = 500 * MS
 _DISCOVERY_NS: Final = 3_000 * MS
-"""From the start until the multiplexer and its inputs are discovered, if there are any."""
+"""Until the multiplexer, its inputs and what publishes on them are discovered, if there are any."""
 _COMMANDED_NS: Final = 1_000 * MS
 """A source that has commanded motion counts as one that does for so long: twice twist_mux's usual timeout."""
 
@@ -50,16 +50,22 @@ class OtherSources:
     """
 
     def __init__(self, node: Any, outputs: Sequence[str], ours: Container[str]) -> None:
-        self._known_from_ns = time.monotonic_ns() + _DISCOVERY_NS
+        self._began_ns = time.monotonic_ns()
         self._node = node
         self._outputs, self._ours = outputs, ours
         self._inputs: dict[str, _Input] = {}
         self._found: dict[str, str] = {}
         self._looked_ns = 0
 
-    def known(self, now_ns: int) -> bool:
-        """Whether there has been time enough to discover them."""
-        return now_ns >= self._known_from_ns
+    def known(self, now_ns: int, foreign_motion_ns: int) -> bool:
+        """Whether there has been time enough to discover them.
+
+        Args:
+            now_ns: monotonic.
+            foreign_motion_ns: when one of them last moved the base; 0 if none has. The multiplexer may have
+                discovered it before it was discovered here.
+        """
+        return now_ns - max(self._began_ns, foreign_motion_ns) >= _DISCOVERY_NS
 
     def commanding(self, now_ns: int) -> tuple[str, ...]:
         """Returns the topics on which motion was commanded lately."""

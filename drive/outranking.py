@@ -16,13 +16,17 @@ _SAME_RAD_S: Final = 0.02
 
 
 class Outranking:
-    """Compares what is published here with what reaches the base."""
+    """Compares what is published here with what reaches the base.
+
+    Attributes:
+        foreign_motion_ns: when motion that was not commanded here last reached the base; 0 before the first.
+    """
 
     def __init__(self) -> None:
         self._published: deque[tuple[int, Velocity]] = deque(maxlen=64)
         self._moving_since_ns: int | None = None
         self._ours_ns = 0
-        self._foreign_motion_ns = 0
+        self.foreign_motion_ns = 0
 
     def published(self, velocity: Velocity, now_ns: int) -> None:
         """Records a velocity published here."""
@@ -37,7 +41,7 @@ class Outranking:
         if any(now_ns - at_ns <= _REMEMBERED_NS and _same(ours, velocity) for at_ns, ours in self._published):
             self._ours_ns = now_ns
         elif not _same(velocity, ZERO):
-            self._foreign_motion_ns = now_ns
+            self.foreign_motion_ns = now_ns
 
     def outranked(self, now_ns: int) -> bool:
         """Returns whether another source has the base.
@@ -46,7 +50,7 @@ class Outranking:
         multiplexer forwards nothing. Otherwise only motion that was not commanded here is.
         """
         if self._moving_since_ns is None:
-            return self._foreign_motion_ns > 0 and now_ns - self._foreign_motion_ns <= _JUDGED_AFTER_NS
+            return self.foreign_motion_ns > 0 and now_ns - self.foreign_motion_ns <= _JUDGED_AFTER_NS
         since_ns = max(self._moving_since_ns, self._ours_ns)
         return now_ns - since_ns > _JUDGED_AFTER_NS
 

@@ -138,7 +138,7 @@ class Surroundings:
         base_present: something takes the velocity commands.
         outranked: the base follows another source although motion is commanded here.
         still: odometry shows no motion; None without odometry.
-        sources_known: what else commands the robot has been discovered.
+        sources_known: whether there was time to discover what else commands the robot.
         commanded_on: topics on which other sources command motion, whether it reaches the base or not.
     """
 

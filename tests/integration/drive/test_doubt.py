@@ -13,6 +13,7 @@ import psutil
 import pytest
 
 from common.ros_node import OwnNode, message_class, ros_node
+from drive.config import DriveSettings
 from omniseer.drive.v1 import drive_pb2 as pb
 from tests.support.drive_peer import Instants
 from tests.support.driving import Driving, driving
@@ -177,6 +178,32 @@ def test_a_reset_does_not_leave_the_robot_to_autonomy_that_goes_on(robot: Drivin
         assert not robot.witness.motion_since(began_ns)
     finally:
         robot.robot.change(commander="nobody", speed_mps=0.0)
+
+
+def test_a_reset_waits_until_a_source_that_moved_the_robot_can_be_heard(robot: Driving) -> None:
+    """Of one that has just appeared the multiplexer may know before the drive program does."""
+    peer = robot.ready()
+    mux_output = DriveSettings().mux_output
+    assert mux_output
+    message = message_class(mux_output.type)()
+    message.twist.linear.x = 0.2
+    with ros_node("unheard") as node:
+        publisher = node.create_publisher(type(message), mux_output.topic, 1)
+
+        def is_seen() -> bool:
+            publisher.publish(message)
+            return "moves the robot" in robot.state().reset_obstacle
+
+        peer.send(stop="ben")
+        robot.phase_is("STOPPED")
+        wait_until(is_seen, "a source that no input shows moves the base")
+    moved_ns = time.monotonic_ns()
+    wait_until(lambda: "moves the robot" not in robot.state().reset_obstacle, "it is silent")
+    assert "what else commands the robot" in robot.state().reset_obstacle
+    wait_until(lambda: not robot.state().reset_obstacle, "it would have been heard")
+    assert time.monotonic_ns() - moved_ns > 2_500_000_000
+    peer.send(reset=robot.state().stop.stop_id)
+    robot.phase_is("AVAILABLE")
 
 
 def _send(**line: Any) -> Callable[[Driving], None]:

@@ -47,6 +47,7 @@ def test_without_motion_of_ours_only_foreign_motion_counts() -> None:
     outranking.seen(THEIRS, 1000 * MS)
     assert outranking.outranked(1300 * MS)
     assert not outranking.outranked(1301 * MS)
+    assert outranking.foreign_motion_ns == 1000 * MS
 
 
 def test_a_velocity_of_a_moment_ago_is_still_ours() -> None:

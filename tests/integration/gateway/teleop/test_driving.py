@@ -149,7 +149,7 @@ async def test_a_reset_that_is_refused_names_the_other_source(
         planning = asyncio.create_task(plan(planner.create_publisher(twist_stamped, "/cmd_vel_nav", 1)))
         await eventually(moved_for_a_second, bool, "the planner moves the robot")
         await client.stop_robot()
-        # At first the drive program may not have found the topic yet, and refuses without a name.
+        # At first the drive program may not hear the planner yet, and refuses without a name.
         named = "another source commands motion on /cmd_vel_nav"
         refused = await eventually(resets, lambda said: not said or named in said, "it is named")
         assert refused.startswith(Reason.STOP_NOT_RESET)
