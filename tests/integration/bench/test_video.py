@@ -62,7 +62,8 @@ def test_a_round_of_the_viewers_cpu(robot: product.Robot) -> None:
         found = receiver_cpu.one_round(robot.client.target, settle_s=2.0, watch_s=1.0)
     for each in found:
         assert each.ms_per_frame > 0
-        assert 1 < each.fps < 40
+        # On a busy machine a viewer may catch up on frames from before: a benchmark discards such a round.
+        assert 1 < each.fps < 60
 
 
 def test_a_round_of_switches(robot: product.Robot) -> None:
