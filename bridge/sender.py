@@ -47,18 +47,28 @@ class Sender:
     async def run(self) -> None:
         """Sends events and results."""
         async with asyncio.TaskGroup() as group:
-            group.create_task(self._keep_sending(self._send_batch), name="send-events")
-            group.create_task(self._keep_sending(self._send_result), name="send-results")
+            group.create_task(
+                self._keep_sending(self._send_batch, lambda: self._outbox.facts), name="send-events"
+            )
+            group.create_task(
+                self._keep_sending(self._send_result, lambda: self._outbox.results), name="send-results"
+            )
 
-    async def _keep_sending(self, send: Callable[[], Awaitable[bool]]) -> None:
+    async def _keep_sending(self, send: Callable[[], Awaitable[bool]], kept: Callable[[], object]) -> None:
+        """Sends what there is, and again when the outbox keeps something new.
+
+        Args:
+            send: returns False if there is nothing.
+            kept: changes with whatever `send` would find.
+        """
         backoff = JitteredBackoff()
         while True:
-            before = self._outbox.facts, self._outbox.results
+            before = kept()
             try:
                 await self._hub.connected()
                 if not await send():
                     await self._outbox.changes.wait_until(
-                        lambda: before != (self._outbox.facts, self._outbox.results)  # noqa: B023  # awaited here
+                        lambda: kept() != before  # noqa: B023  # awaited here
                     )
                 backoff.reset()
             except (HubError, OutboxError) as error:

@@ -242,11 +242,12 @@ class Database:
     def _use(self) -> Iterator[sqlite3.Connection]:
         """Opens the database if it is not, and makes one transaction of the block."""
         try:
-            db = self._connection or self._open()
-            self._connection = db
+            changes = self._connection.total_changes if self._connection else -1
+            db = self._connection = self._connection or self._open()
             db.execute("BEGIN IMMEDIATE")
             yield db
-            self._facts = self._read_facts(db)
+            if db.total_changes != changes:  # Or it has just been opened.
+                self._facts = self._read_facts(db)
             db.execute("COMMIT")
         except BaseException as error:
             # What the database has not taken is rolled back, and it is examined again when it is opened.

@@ -4,6 +4,7 @@ Screenshots of every situation are kept in artifacts/monitor; docs/images has th
 SCREENSHOTS_FOR_DOCUMENTS=1.
 """
 
+import os
 import statistics
 import time
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ from functools import partial
 from itertools import islice
 from pathlib import Path
 
+import psutil
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage
@@ -185,6 +187,7 @@ def boxes_are_drawn(watch: Watch) -> None:
 
 @pytest.mark.timed
 def test_the_window_answers_while_video_plays_and_closes_at_once(watch: Watch) -> None:
+    yield_to_the_window()
     watch.key(Qt.Key.Key_P)
     watch.preview_is("RUNNING")
     watch.video_moves()
@@ -196,6 +199,14 @@ def test_the_window_answers_while_video_plays_and_closes_at_once(watch: Watch) -
     press(watch.window, Qt.Key.Key_Q)
     until(lambda: not watch.window.isVisible(), "it is closed", CLOSES_WITHIN_S)
     assert time.monotonic() - closed_s < CLOSES_WITHIN_S
+
+
+def yield_to_the_window() -> None:
+    """The robot is another machine: here it must not take the processors that the window needs."""
+    for program in psutil.Process().children(recursive=True):
+        # Those that it will start as well; a nice value is that of a thread, not of a process (sched(7)).
+        for thread in program.threads():
+            os.setpriority(os.PRIO_PROCESS, thread.id, 10)
 
 
 def loop_delay_p99_ms(window: MonitorWindow) -> float:
