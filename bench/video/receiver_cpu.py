@@ -40,6 +40,11 @@ class Viewed:
     ms_per_frame: float
     fps: float
 
+    @property
+    def is_complete(self) -> bool:
+        """Whether it saw the camera's frames of this time, neither fewer nor more."""
+        return LEAST_DELIVERED * FPS <= self.fps <= MOST_DELIVERED * FPS
+
     def __str__(self) -> str:
         return f"{self.ms_per_frame:.2f} ms a frame at {self.fps:.1f} fps"
 
@@ -51,11 +56,11 @@ def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
     with camera(workdir, FPS) as source, product.robot(workdir, source, LATENCY_MS) as robot, robot.preview():
         while len(direct) < ROUNDS:
             if len(direct) + discarded == TRIES:
-                raise MeasurementError(f"frames were missing in {discarded} rounds: the machine is too busy")
+                raise MeasurementError(
+                    f"frames were missing or delayed in {discarded} rounds: the machine is too busy"
+                )
             ours, theirs = one_round(robot.client.target)
-            complete = all(
-                LEAST_DELIVERED * FPS <= each.fps <= MOST_DELIVERED * FPS for each in (ours, theirs)
-            )
+            complete = ours.is_complete and theirs.is_complete
             log(f"direct: {ours}; SRT's own: {theirs}{'' if complete else '; discarded'}")
             if complete:
                 direct.append(ours.ms_per_frame)
