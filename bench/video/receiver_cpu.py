@@ -1,10 +1,12 @@
 """CPU of a viewer without a window for each frame: direct delivery against SRT's own, at once, of one stream.
 
 A viewer that loses frames needs less, so a round in which either misses too many is discarded. So is one in
-which either catches up on frames from before: there were more than the camera has.
+which either catches up on frames from before: there were more than the camera has. A viewer that has started
+too late to see two frames has no rate at all.
 """
 
 import json
+import math
 import signal
 import subprocess
 import sys
@@ -109,5 +111,5 @@ def _viewed(viewer: "subprocess.Popen[str]", share: float) -> Viewed:
     """
     viewer.send_signal(signal.SIGINT)
     summary, _ = viewer.communicate(timeout=_ENDS_WITHIN_S)
-    fps = float(json.loads(summary)["fps"])
-    return Viewed(1000 * share / fps, fps)
+    fps: float | None = json.loads(summary)["fps"]
+    return Viewed(1000 * share / fps, fps) if fps else Viewed(math.inf, 0.0)

@@ -59,10 +59,11 @@ def test_a_round_of_a_peer(source: Camera, robot: product.Robot, name: str) -> N
 
 def test_a_round_of_the_viewers_cpu(robot: product.Robot) -> None:
     with robot.preview():
-        # A viewer on a busy machine may catch up on older frames: the benchmark discards that round as well.
+        # On a busy machine a viewer may catch up on older frames, or start too late to see any: the benchmark
+        # discards that round as well.
         for _ in range(3):
             found = receiver_cpu.one_round(robot.client.target, settle_s=2.0, watch_s=1.0)
-            if all(each.fps < 40 for each in found):
+            if all(1 < each.fps < 40 for each in found):
                 break
     for each in found:
         assert each.ms_per_frame > 0
