@@ -195,6 +195,11 @@ def unit_of(file: str) -> str:
     return _CONTAINERS if file.startswith(_CONTAINERS) and file not in _STAND_INS else file
 
 
+def shares_a_deployment(item: pytest.Item) -> bool:
+    """Returns whether the test is of those files that share the containers of `_shared_demo`."""
+    return _file_of(item.nodeid) in _SHARING
+
+
 @cache
 def is_paced(file: Path) -> bool:
     """Returns whether the file's tests run what fails where it gets no processor in time."""
