@@ -2,6 +2,9 @@
 
 A caller may send its own id in the metadata. Otherwise one is generated on first use, because most requests
 write no log line.
+
+What a call has started, a timer or a task, may write a line after the call has ended. gRPC frees the
+metadata of a call with its end, so that they are read at its beginning, or never.
 """
 
 import re
@@ -26,15 +29,14 @@ class HasMetadata(Protocol):
 
 
 class _Request:
-    __slots__ = ("_call", "_id")
+    __slots__ = ("_id",)
 
-    def __init__(self, call: HasMetadata | None, known: str = "") -> None:
-        self._call = call
+    def __init__(self, known: str) -> None:
         self._id = known
 
     def id(self) -> str:
         if not self._id:
-            self._id = _sent_by(self._call) or secrets.token_hex(_NEW_BYTES)
+            self._id = secrets.token_hex(_NEW_BYTES)
         return self._id
 
 
@@ -43,7 +45,7 @@ _request: ContextVar[_Request | None] = ContextVar("request", default=None)
 
 def begin(call: HasMetadata) -> None:
     """Associates the current task with this call, until the task ends."""
-    _request.set(_Request(call))
+    _request.set(_Request(_sent_by(call)))
 
 
 def current() -> str:
@@ -55,15 +57,15 @@ def current() -> str:
 @contextmanager
 def continuing(request_id: str) -> Iterator[None]:
     """Runs the block on behalf of the given request; of none if the id is empty."""
-    token = _request.set(_Request(None, request_id) if request_id else None)
+    token = _request.set(_Request(request_id) if request_id else None)
     try:
         yield
     finally:
         _request.reset(token)
 
 
-def _sent_by(call: HasMetadata | None) -> str:
-    for key, value in (call.invocation_metadata() or ()) if call else ():
+def _sent_by(call: HasMetadata) -> str:
+    for key, value in call.invocation_metadata() or ():
         if key == HEADER and isinstance(value, str) and _FIT_TO_LOG.fullmatch(value):
             return value
     return ""
