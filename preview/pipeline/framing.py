@@ -103,7 +103,8 @@ class Framing:
         clock = self._pipe_in.get_clock()
         if newest is None or clock is None or self._first_captured_ns is None:
             return 0.0
-        captured_at = self._first_captured_ns + newest.get_buffer_list().get(0).pts
+        # The first one of the frame's list, which the sink sets a moment after it.
+        captured_at = self._first_captured_ns + newest.get_buffer().pts
         age_ms: float = (clock.get_time() - captured_at) / Gst.MSECOND
         return max(0.0, age_ms)
 

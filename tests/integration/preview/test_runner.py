@@ -16,6 +16,7 @@ from common.gst import Gst
 from preview.config import AdaptiveSettings
 from preview.pipeline.adaptive import BitrateController, Decision, Sample
 from preview.pipeline.events import AccessUnit, PipelineEvents
+from preview.pipeline.framing import Framing
 from preview.pipeline.listener import Listener
 from preview.pipeline.plan import Plan
 from preview.pipeline.runner import Runner
@@ -82,6 +83,22 @@ async def test_an_age_that_the_camera_causes_is_not_of_the_link() -> None:
     runner.take_picture_age(600)
     assert age.counting(time.monotonic()) is None
     assert await (await runner.stop())
+
+
+async def test_the_age_of_the_newest_frame_can_be_read_at_every_moment() -> None:
+    """The sink takes the first buffer of a frame and the list of all one after the other."""
+
+    def read_until_the_first_frame(framing: Framing) -> None:
+        deadline = time.monotonic() + 10.0
+        while not framing.last_frame_age_ms:
+            assert time.monotonic() < deadline
+
+    for _ in range(5):
+        runner = Runner(plan_of(LIVE), Events())
+        reading = asyncio.create_task(asyncio.to_thread(read_until_the_first_frame, runner._framing))
+        await runner.start()
+        await reading
+        assert await (await runner.stop())
 
 
 async def test_a_recording_gets_every_encoded_frame() -> None:
