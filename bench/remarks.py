@@ -26,6 +26,15 @@ REMARKS: Final[Mapping[tuple[str, ...], str]] = {
         " and over loopback it takes all that the processors have; `export.status_p99` has the limit that"
         " leaves a status its time."
     ),
+    ("drive.cpu",): (
+        "a bar on the value itself, on two slow cores. Driven, the program takes 100 commands a second, 50 on"
+        " each lane, and publishes 50."
+    ),
+    ("drive.false_stops_very_lossy",): (
+        "a packet that is lost, and whose repetition is lost as well, holds up a lane for longer than the"
+        " 250 ms that a command is valid. At 10 % loss that happens on both lanes at once about every minute,"
+        " and the robot stops until the next command."
+    ),
     ("video.cpu", "video.cpu_in_turns"): (
         "what is above the reference is Python once per frame (`preview/pipeline/framing.py`), and the hop"
         " between the camera's and the encoder's thread. In turns, what else the machine does differs"
