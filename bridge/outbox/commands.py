@@ -1,9 +1,16 @@
-"""Commands of the hub in the outbox's database: each is carried out once, and its result kept until sent."""
+"""Commands of the hub in the outbox's database: each is carried out once, and its result kept until sent.
 
+How many commands there are, and whether their results are ever taken, is up to the hub: only the newest are
+kept.
+"""
+
+import logging
 import sqlite3
 from typing import Final
 
-_MOST_COMMANDS: Final = 1024
+_log = logging.getLogger(__name__)
+
+MOST_COMMANDS: Final = 1024
 """Commands that are remembered, so that none is carried out twice."""
 
 
@@ -11,17 +18,13 @@ def begin(db: sqlite3.Connection, command_id: str) -> bool:
     """Remembers a command; returns False if it is known already."""
     known = db.execute("SELECT 1 FROM commands WHERE command_id = ?", (command_id,)).fetchone()
     if known is None:
-        db.execute("INSERT INTO commands (command_id) VALUES (?)", (command_id,))
-        db.execute(
-            "DELETE FROM commands WHERE sent = 1 AND id <= (SELECT max(id) FROM commands) - ?",
-            (_MOST_COMMANDS,),
-        )
+        _add(db, command_id)
     return known is None
 
 
 def end(db: sqlite3.Connection, command_id: str, result: bytes) -> None:
     """Keeps a result; a second one of the same command is ignored."""
-    db.execute("INSERT OR IGNORE INTO commands (command_id) VALUES (?)", (command_id,))
+    _add(db, command_id)
     db.execute("UPDATE commands SET result = ? WHERE command_id = ? AND result IS NULL", (result, command_id))
 
 
@@ -42,3 +45,20 @@ def next_result(db: sqlite3.Connection) -> tuple[str, bytes] | None:
 def result_sent(db: sqlite3.Connection, command_id: str) -> None:
     """Notes that a result was sent."""
     db.execute("UPDATE commands SET sent = 1 WHERE command_id = ?", (command_id,))
+
+
+def _add(db: sqlite3.Connection, command_id: str) -> None:
+    """Adds a command that is not known yet, and forgets old ones, but none that is being carried out."""
+    db.execute("INSERT OR IGNORE INTO commands (command_id) VALUES (?)", (command_id,))
+    forgotten = db.execute(
+        "DELETE FROM commands WHERE result IS NOT NULL AND id <= (SELECT max(id) FROM commands) - ?"
+        " RETURNING command_id, sent",
+        (MOST_COMMANDS,),
+    ).fetchall()
+    for forgotten_id, sent in forgotten:
+        if not sent:
+            _log.warning(
+                "the result of command %s is dropped: the hub has not taken it, and %d commands came since",
+                forgotten_id,
+                MOST_COMMANDS,
+            )

@@ -2,11 +2,14 @@
 
 import random
 import shutil
+import sqlite3
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
+from bridge.outbox import commands
 from bridge.outbox.cursor import NAME as CURSOR
 from bridge.outbox.database import DAMAGED_NAME, NAME, RESERVE_BYTES, Database
 from bridge.values import Batch, DropReason, Event, Gap, Item, OutboxError, Position
@@ -285,6 +288,29 @@ def test_a_command_is_begun_once_and_has_one_result(database: Database) -> None:
     database.result_sent("b2")
     assert database.next_result() is None
     assert not database.begin_command("a1")
+
+
+@pytest.mark.parametrize("taken_by_the_hub", [False, True])
+def test_only_the_newest_commands_are_remembered(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, taken_by_the_hub: bool
+) -> None:
+    monkeypatch.setattr(commands, "MOST_COMMANDS", 16)
+    database = opened(tmp_path)
+    assert database.begin_command("running")
+    for number in range(100):
+        database.end_command(f"c{number}", b"refused")
+        if taken_by_the_hub:
+            database.result_sent(f"c{number}")
+    assert database.unanswered_commands() == ["running"]
+    assert not any(database.begin_command(f"c{number}") for number in range(84, 100))
+    waiting = []
+    while result := database.next_result():
+        waiting.append(result[0])
+        database.result_sent(result[0])
+    assert waiting == ([] if taken_by_the_hub else [f"c{number}" for number in range(84, 100)])
+    database.close()
+    with closing(sqlite3.connect(tmp_path / NAME)) as db:
+        assert db.execute("SELECT count(*) FROM commands").fetchone() == (17,)
 
 
 def test_rows_of_uploads_are_kept(tmp_path: Path) -> None:
