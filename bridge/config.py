@@ -11,6 +11,7 @@ from common.config import Section, Settings
 from common.errors import UserError
 from console.target import DEFAULT_TARGET, parse_target
 from fleet.names import ROBOT_NAME
+from fleet.servers import exposed_server
 
 MIB: Final = 1024 * 1024
 Name = Annotated[str, Field(pattern=f"^{ROBOT_NAME.pattern}$")]
@@ -55,7 +56,7 @@ class HubSettings(Section):
     credentials: Path | None = None
     """The robot's bridge.creds. None: the hub asks for none, which it does in tests alone."""
     ca: Path | None = None
-    """Certificate authority of the servers. None: without TLS, which servers called nats:// are for."""
+    """Certificate authority of the servers. None: without TLS, for servers on this machine."""
     receipts: Path | None = None
     """Public keys of the receivers of recordings."""
     robot: Name = "robot"
@@ -97,8 +98,10 @@ class BridgeSettings(Settings):
     """Where operators near the robot reach its gateway, as HOST:PORT, for the fleet's table."""
 
     @model_validator(mode="after")
-    def _tls_has_an_authority(self) -> Self:
-        # Without one, any server could pass for the hub.
-        if self.hub.ca is None and any(each.startswith("tls://") for each in self.hub.servers):
-            raise ValueError("hub.ca is missing: the file ca.pem of the robot's enrolment")
+    def _is_encrypted(self) -> Self:
+        if server := exposed_server(self.hub.servers, self.hub.ca):
+            raise ValueError(
+                f"hub.ca is missing, the file ca.pem of the robot's enrolment: without it {server} can't be "
+                "used, only nats:// to this machine, for tests"
+            )
         return self

@@ -14,6 +14,7 @@ from rich.table import Table
 from common.errors import ExitCode, UserError
 from fleet.connection import FleetAddress
 from fleet.errors import HubError, HubReason
+from fleet.servers import exposed_server
 from hub import administration
 from hub.directory import HubDirectory, Kind
 from hub.receiver.cli import receiver
@@ -231,6 +232,12 @@ def exporter(
     from hub.exporter.app import export_until_stopped  # noqa: PLC0415 - prometheus_client
 
     names = tuple(part.strip() for part in servers.split(",") if part.strip())
+    if server := exposed_server(names, ca):
+        raise UserError(
+            f"--ca is missing: without it {server} can't be used, only nats:// to this machine",
+            "Add --ca FILE, with the ca.pem of the hub",
+            exit_code=ExitCode.USAGE,
+        )
     address = FleetAddress(names, credentials, ca, name="robot-bridge hub exporter")
     asyncio.run(export_until_stopped(address, host, port))
 

@@ -6,11 +6,11 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import Field, model_validator
 
 from common.config import Section
+from fleet.servers import THIS_MACHINE
 
 _TIME: Final = r"([01][0-9]|2[0-3]):[0-5][0-9]"
 _HOST: Final = r"^[a-z0-9]([a-z0-9.-]{0,251}[a-z0-9])?(:[0-9]{1,5})?$"
 _MOST: Final = 16
-LOOPBACK: Final = frozenset({"127.0.0.1", "localhost"})
 
 
 class UploadSettings(Section):
@@ -41,6 +41,7 @@ class UploadSettings(Section):
     def _is_possible(self) -> Self:
         if 0 < self.max_bytes_per_s < 65_536:
             raise ValueError("max_bytes_per_s must be 0 or at least 65536")
-        if self.insecure_store and any(host.partition(":")[0] not in LOOPBACK for host in self.store_hosts):
+        names = {host.partition(":")[0] for host in self.store_hosts}
+        if self.insecure_store and not names <= THIS_MACHINE:
             raise ValueError("insecure_store is for stores on 127.0.0.1 alone")
         return self

@@ -29,6 +29,7 @@ from console.robots.credentials import read_private
 from console.robots.login_text import parse_login_text
 from console.robots.robots_file import read_text, robots_file_path
 from fleet.names import ROBOT_NAME
+from fleet.servers import exposed_server
 
 HEAD: Final = "# Robot Gateway fleet login 1"
 _WORDS: Final = ("fleet", "name", "servers", "receivers")
@@ -119,13 +120,13 @@ def read_fleet_login(path: Path | None = None) -> FleetLogin:
 
 
 def login_of_servers(servers: str) -> FleetLogin:
-    """Returns the login of a hub without authentication, as in a demonstration on one computer.
+    """Returns the login of a hub without authentication and TLS, on this computer: a demonstration.
 
     Args:
         servers: Separated by commas.
 
     Raises:
-        UserError: One is no server.
+        UserError: One is no server, or on another computer.
     """
 
     def wrong(why: str) -> UserError:
@@ -133,7 +134,14 @@ def login_of_servers(servers: str) -> FleetLogin:
             f"--hub: {why}", "Write nats://127.0.0.1:4222, for example", exit_code=ExitCode.USAGE
         )
 
-    return FleetLogin("", "", _servers(_listed(servers), wrong))
+    named = _servers(_listed(servers), wrong)
+    if server := exposed_server(named, None):
+        raise UserError(
+            f"--hub: {server} is not on this computer, and the connection would not be encrypted",
+            "Log in with the file that the hub's administrator made: robotctl fleet login FILE",
+            exit_code=ExitCode.USAGE,
+        )
+    return FleetLogin("", "", named)
 
 
 def _login(path: Path, values: dict[str, Any], wrong: Any) -> FleetLogin:

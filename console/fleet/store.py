@@ -29,12 +29,12 @@ from console.client.errors import GatewayFailed, NotTrusted, Overloaded, Refused
 from console.client.exporting import SILENT_S, PullStream, chunk_of
 from console.client.mapping.methods import Method
 from console.client.results import ExportHeader, RecordingFile
+from fleet.servers import THIS_MACHINE
 from omniseer.gateway.v1.recording_pb2 import ExportRecordingRequest
 
 _CHUNK: Final = 256 * 1024
 _CONNECTED_WITHIN_S: Final = 10.0
 _LONGEST_URL: Final = 8192
-_LOOPBACK: Final = frozenset({"127.0.0.1", "::1", "localhost"})
 _BUSY: Final = frozenset({HTTPStatus.TOO_MANY_REQUESTS, HTTPStatus.SERVICE_UNAVAILABLE})
 _WAIT: Final = "The store is reached at the address that the receivers have; docs/uploads.md"
 
@@ -134,7 +134,7 @@ def usable(url: str) -> SplitResult:
     """
     with suppress(ValueError):  # It has no port, or half of an IPv6 address.
         parts = urlsplit(url)
-        secure = parts.scheme == "https" or (parts.scheme == "http" and parts.hostname in _LOOPBACK)
+        secure = parts.scheme == "https" or (parts.scheme == "http" and parts.hostname in THIS_MACHINE)
         plain = url.isascii() and url.isprintable() and " " not in url and len(url) <= _LONGEST_URL
         if secure and plain and parts.hostname and "@" not in parts.netloc and parts.port != 0:
             return parts

@@ -1,12 +1,13 @@
 """Settings of the receiver: one YAML file, overridden by `RECEIVER__...` environment variables."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 from pydantic_settings import SettingsConfigDict
 
 from common.config import Section, Settings
+from fleet.servers import exposed_server
 
 _Name = Annotated[str, Field(pattern=r"^[a-z0-9]([a-z0-9-]{0,61}[a-z0-9])?$")]
 
@@ -18,7 +19,16 @@ class HubSettings(Section):
     """As "tls://host:4222"; all are nodes of one hub."""
     credentials: Path | None = None
     ca: Path | None = None
-    """Authority of the servers' certificates. None connects without TLS: for tests."""
+    """Authority of the servers' certificates. None connects without TLS, to this machine only: for tests."""
+
+    @model_validator(mode="after")
+    def _is_encrypted(self) -> Self:
+        if server := exposed_server(self.servers, self.ca):
+            raise ValueError(
+                f"ca is missing, the file ca.pem of the hub: without it {server} can't be used, "
+                "only nats:// to this machine"
+            )
+        return self
 
 
 class StoreSettings(Section):

@@ -70,9 +70,10 @@ def run(*arguments: str) -> "subprocess.CompletedProcess[str]":
     )
 
 
-def test_a_wrong_configuration_is_one_line(tmp_path: Path) -> None:
+@pytest.mark.parametrize("server", ["tls://hub:4222", "nats://hub:4222"])
+def test_a_hub_on_the_network_is_not_used_without_its_authority(tmp_path: Path, server: str) -> None:
     config = tmp_path / "bridge.yaml"
-    config.write_text(json.dumps({"hub": {"servers": ["tls://hub:4222"]}}), encoding="utf-8")
+    config.write_text(json.dumps({"hub": {"servers": [server]}}), encoding="utf-8")
     ended = run("check", "--config", str(config))
     assert ended.returncode == 2
     assert "hub.ca is missing" in ended.stderr

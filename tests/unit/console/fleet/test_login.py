@@ -77,7 +77,13 @@ def test_a_secret_that_others_may_read_is_refused(path: Path) -> None:
 
 
 def test_a_hub_without_authentication() -> None:
-    servers = ("nats://a:1", "nats://b:2")
-    assert login_of_servers("nats://a:1, nats://b:2") == FleetLogin("", "", servers)
+    servers = ("nats://127.0.0.1:1", "nats://localhost:2")
+    assert login_of_servers("nats://127.0.0.1:1, nats://localhost:2") == FleetLogin("", "", servers)
     with pytest.raises(UserError, match="is not an address"):
         login_of_servers("a:1")
+
+
+@pytest.mark.parametrize("server", ["nats://hub.example:4222", "tls://127.0.0.1:4222", "nats://10.0.0.1:1"])
+def test_another_computer_is_not_reached_without_tls(server: str) -> None:
+    with pytest.raises(UserError, match="fleet login FILE"):
+        login_of_servers(f"nats://127.0.0.1:4222, {server}")
