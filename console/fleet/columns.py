@@ -1,7 +1,7 @@
 """The columns of the fleet's table, in the order of an operator's interest. Pure text with styles."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from console.client.results import FaultSeverity, Freshness, RecordingCopyState, Sample
@@ -47,10 +47,11 @@ class Column:
 
     Args:
         title: Its heading.
-        width: Characters that it takes at the most, as a rule.
+        width: Characters that it takes at the most.
         cell: Its cell of a row.
         right: Whether it is aligned right, as numbers are.
         rank: 0 is shown at any width; of the others a narrow terminal leaves out the highest first.
+        grows: Whether it gets what a terminal has beyond the columns that it shows, up to `LONGEST_TEXT`.
     """
 
     title: str
@@ -58,6 +59,7 @@ class Column:
     cell: Callable[[FleetRow], Cell]
     right: bool = False
     rank: int = 0
+    grows: bool = False
 
 
 def shortened(text: str, longest: int = LONGEST_TEXT) -> str:
@@ -69,9 +71,14 @@ def columns_for(width: int) -> tuple[Column, ...]:
     """Returns the columns for a terminal of so many characters: all, or those that matter most."""
     for rank in sorted({column.rank for column in COLUMNS}, reverse=True):
         shown = tuple(column for column in COLUMNS if column.rank <= rank)
-        if not rank or sum(column.width + _GAP for column in shown) <= width:
+        left = width - sum(column.width + _GAP for column in shown)
+        if not rank or left >= 0:
             break
-    return shown
+    return tuple(_grown(column, max(left, 0)) for column in shown)
+
+
+def _grown(column: Column, left: int) -> Column:
+    return replace(column, width=min(column.width + left, LONGEST_TEXT)) if column.grows else column
 
 
 def summary_line(found: FleetSummary) -> str:
@@ -197,12 +204,12 @@ COLUMNS: Final = (
     Column("robot", 16, lambda row: Cell(shortened(row.robot))),
     Column("", 12, _standing),
     Column("since", 11, lambda row: Cell(age(row.since_ms)), right=True),
-    Column("health", 36, _health),
+    Column("health", 20, _health, grows=True),
     Column("battery", 8, _of_state(battery_cell), right=True),
     Column("disk", 5, _of_state(disk_cell), right=True, rank=1),
-    Column("mode", 10, _of_state(lambda it: Cell(shortened(it.mode, 20) or UNKNOWN)), rank=1),
-    Column("values", 40, _of_state(_values), rank=2),
-    Column("uploads", 20, _of_state(_uploads), rank=1),
-    Column("outbox", 8, _of_state(_outbox), right=True, rank=1),
+    Column("mode", 10, _of_state(lambda it: Cell(shortened(it.mode, 20) or UNKNOWN)), rank=4),
+    Column("values", 40, _of_state(_values), rank=5),
+    Column("uploads", 20, _of_state(_uploads), rank=2),
+    Column("outbox", 8, _of_state(_outbox), right=True, rank=3),
     Column("seen", 11, lambda row: Cell(age(row.last_seen_ms), SeverityStyle.QUIET), right=True),
 )

@@ -140,10 +140,19 @@ def test_no_cell_of_a_giant_state_is_long() -> None:
 
 
 def test_a_narrow_terminal_gets_the_columns_that_matter_most() -> None:
-    assert columns_for(220) == COLUMNS
-    assert [column.title for column in COLUMNS if column not in columns_for(170)] == ["values"]
-    titles = [column.title for column in columns_for(100)]
+    titles = [column.title for column in columns_for(90)]
     assert titles == ["robot", "", "since", "health", "battery", "seen"]
+    titles = [column.title for column in columns_for(120)]
+    assert titles == ["robot", "", "since", "health", "battery", "disk", "uploads", "seen"]
+    titles = [column.title for column in columns_for(170)]
+    assert titles == [column.title for column in COLUMNS if column.title != "values"]
+    assert [column.title for column in columns_for(220)] == [column.title for column in COLUMNS]
+
+
+@pytest.mark.parametrize(("width", "health"), [(80, 20), (120, 21), (170, 49), (300, 60)])
+def test_the_health_gets_what_is_left(width: int, health: int) -> None:
+    (column,) = (column for column in columns_for(width) if column.title == "health")
+    assert column.width == health
 
 
 def test_the_line_below_has_only_what_there_is() -> None:
