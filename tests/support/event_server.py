@@ -1,8 +1,9 @@
-"""The gateway's event streams on a port of their own: things happen when a test says so, and runs end."""
+"""The gateway's streams of events and status on a port of their own: things happen when a test says so."""
 
 import asyncio
+from collections.abc import AsyncIterator
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Final, Self
 
 import grpc
 
@@ -14,7 +15,15 @@ from gateway.rpc.responses.event_stream import EventStream
 from gateway.status.event import Event, ModeChanged
 from gateway.status.event_log import EventLog
 from gateway.status.fault import Severity
-from omniseer.gateway.v1.robot_gateway_pb2 import SubscribeEventsRequest
+from omniseer.gateway.v1.robot_gateway_pb2 import (
+    SubscribeEventsRequest,
+    WatchSystemStatusRequest,
+    WatchSystemStatusResponse,
+)
+from omniseer.gateway.v1.system_status_pb2 import SystemStatus
+
+_STATUS_EVERY_S: Final = 1.0
+"""As often as a gateway answers where nothing changes."""
 
 
 class EventServer:
@@ -30,6 +39,8 @@ class EventServer:
         self.port = 0
         self.happened: dict[str, int] = {}
         """How many events each run had."""
+        self._status = SystemStatus()
+        self._status_changed = Broadcast()
 
     @property
     def newest(self) -> EventPosition:
@@ -47,6 +58,11 @@ class EventServer:
         self._log.add(event, 1.0)
         self._appended.notify_all()
         self.happened[self._log.run_id] = self._log.sequence
+
+    def show(self, status: SystemStatus) -> None:
+        """This is the status from now on."""
+        self._status = status
+        self._status_changed.notify_all()
 
     async def restart(self) -> None:
         """The gateway ends, and another run of it takes its place."""
@@ -72,19 +88,24 @@ class EventServer:
             after = position_from(request.after) if request.HasField("after") else None
             return stream.responses(after, Severity.INFO)
 
-        handler: grpc.RpcMethodHandler[SubscribeEventsRequest, bytes] = grpc.unary_stream_rpc_method_handler(
-            _as_generator(subscribe), SubscribeEventsRequest.FromString, None
-        )
+        handlers: dict[str, grpc.RpcMethodHandler[Any, Any]] = {
+            "SubscribeEvents": grpc.unary_stream_rpc_method_handler(
+                _as_generator(subscribe), SubscribeEventsRequest.FromString, None
+            ),
+            "WatchSystemStatus": grpc.unary_stream_rpc_method_handler(
+                self._watch, WatchSystemStatusRequest.FromString, WatchSystemStatusResponse.SerializeToString
+            ),
+        }
         self._server = new_server()
         self._server.add_generic_rpc_handlers(
-            (
-                grpc.method_handlers_generic_handler(
-                    "omniseer.gateway.v1.RobotGateway", {"SubscribeEvents": handler}
-                ),
-            )
+            (grpc.method_handlers_generic_handler("omniseer.gateway.v1.RobotGateway", handlers),)
         )
         self.port = await _bound(self._server, self.port)
         await self._server.start()
+
+    async def _watch(self, _request: Any, _context: Any) -> AsyncIterator[WatchSystemStatusResponse]:
+        async for _ in self._status_changed.now_and_on_change(lambda: _STATUS_EVERY_S):
+            yield WatchSystemStatusResponse(status=self._status)
 
 
 def _as_generator(subscribe: Any) -> Any:

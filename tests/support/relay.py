@@ -1,4 +1,4 @@
-"""A relay for TCP connections to a port of this machine: they can be cut, frozen, and refused."""
+"""A relay for TCP connections to a port of this machine: they can be cut, frozen, delayed, and refused."""
 
 import asyncio
 from types import TracebackType
@@ -14,7 +14,8 @@ class Relay:
     Attributes:
         port: where clients connect.
         open: whether connections are accepted.
-        frozen: whether bytes are kept back, on connections that stay: as where the other end has vanished.
+        frozen: whether bytes are lost, on connections that stay: as where the other end has vanished.
+        through: set while bytes pass; they wait while it is not: as where TCP sends them again and again.
         to_clients: bytes that were passed on to clients.
     """
 
@@ -23,6 +24,8 @@ class Relay:
         self.port = 0
         self.open = True
         self.frozen = False
+        self.through = asyncio.Event()
+        self.through.set()
         self.to_clients = 0
         self._writers: set[asyncio.StreamWriter] = set()
         self._tasks: set[asyncio.Task[None]] = set()
@@ -65,6 +68,7 @@ class Relay:
             while data := await source.read(65536):
                 if self.frozen:
                     continue
+                await self.through.wait()
                 sink.write(data)
                 await sink.drain()
                 if to_client:

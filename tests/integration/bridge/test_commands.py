@@ -14,10 +14,11 @@ from fleet.connection import Hub, Start
 from omniseer.bridge.v1 import bridge_service_pb2 as pb
 from omniseer.bridge.v1.bridge_service_pb2_grpc import BridgeServiceStub
 from omniseer.fleet.v1 import command_pb2
+from omniseer.gateway.v1 import cloud_pb2
 from tests.support.event_server import EventServer
 from tests.support.eventually import eventually
 from tests.support.nats_servers import NatsServers
-from tests.support.running_bridge import ROBOT, BridgeProgram, bridge_program
+from tests.support.running_bridge import ROBOT, BridgeProgram, bridge_program, received
 
 DONE, REFUSED = command_pb2.COMMAND_OUTCOME_DONE, command_pb2.COMMAND_OUTCOME_REFUSED
 EXPIRED, FAILED = command_pb2.COMMAND_OUTCOME_EXPIRED, command_pb2.COMMAND_OUTCOME_FAILED
@@ -138,8 +139,11 @@ async def test_without_a_word_in_the_configuration_nothing_is_taken(
         await asyncio.to_thread(bridge.start)
         await issue(hub, "e1")
         await eventually(
-            lambda: asyncio.to_thread(lambda: bridge.status.events_sent), lambda _: True, "it runs"
+            lambda: asyncio.to_thread(lambda: bridge.status),
+            lambda status: status.state == cloud_pb2.CLOUD_STATE_CONNECTED,
+            "it is connected",
         )
+        await eventually(lambda: received(hub), lambda found: found.batches, "it has sent what it missed")
         assert not await requests(bridge)
         info = await hub.api(f"CONSUMER.INFO.{names.COMMANDS}.{ROBOT}")
     assert info["num_pending"] == 1
