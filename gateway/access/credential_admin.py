@@ -95,8 +95,13 @@ class CredentialAdmin:
             UserError: the name is not allowed, the list is full, or it can't be written.
         """
         check_name(request.name)
-        issued = self._issue(request)
-        return self.directory.change_store(lambda store: (store.adding(issued[0]), issued))
+
+        def change(store: Store) -> tuple[Store, Issued]:
+            # Under the lock: a login with a CA that is being replaced would be worth nothing.
+            issued = self._issue(request)
+            return store.adding(issued[0]), issued
+
+        return self.directory.change_store(change)
 
     def revoke(self, name_or_id: str) -> tuple[Credential, ...]:
         """Revokes all credentials of a name, or the one of an id, and returns them.

@@ -2,13 +2,16 @@
 
 import errno
 import os
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from cryptography.x509 import load_pem_x509_certificate
 
 from common.errors import UserError
+from common.private_files import directory_lock
 from gateway.access.credential import Kind, Validity
 from gateway.access.credential_admin import CredentialAdmin, CredentialRequest
 from gateway.access.directory import CredentialDirectory
@@ -130,6 +133,26 @@ def test_certificates_rotated_at_once_match(admin: CredentialAdmin, tmp_path: Pa
             done.result()
     server, ca = (load_pem_x509_certificate(each.read().certificate) for each in (files.server, files.ca))
     server.verify_directly_issued_by(ca)
+
+
+@pytest.mark.parametrize("kind", Kind)
+def test_a_login_has_the_ca_that_is_in_force_when_it_is_listed(
+    admin: CredentialAdmin, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: Kind
+) -> None:
+    @contextmanager
+    def after_another_program(directory: Path) -> Iterator[None]:
+        monkeypatch.undo()
+        admin.rotate_ca(None)
+        with directory_lock(directory):
+            yield
+
+    monkeypatch.setattr("gateway.access.directory.directory_lock", after_another_program)
+    _, bundle = admin.add(CredentialRequest("anna", Role.VIEWER, kind))
+    ca = CredentialDirectory(tmp_path).ca.read().certificate
+    assert bundle.ca_certificate == ca
+    if bundle.client:
+        client, authority = map(load_pem_x509_certificate, (bundle.client.certificate, ca))
+        client.verify_directly_issued_by(authority)
 
 
 def test_a_full_disk_leaves_all_certificates_as_they_were(
