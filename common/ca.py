@@ -11,7 +11,7 @@ from datetime import UTC, datetime, timedelta
 from typing import Final
 
 from cryptography import x509
-from cryptography.exceptions import UnsupportedAlgorithm
+from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
@@ -139,6 +139,24 @@ def key_matches(pair: KeyPair) -> bool:
         return key.public_key() == certificate.public_key()
     except (TypeError, *_MALFORMED) as error:
         raise ValueError(str(error)) from error
+
+
+def is_issued_by(certificate: bytes, authority: bytes) -> bool:
+    """Returns whether the authority has signed the certificate; both are the first of a PEM file.
+
+    Raises:
+        ValueError: one of them can't be parsed.
+    """
+    try:
+        issued, issuer = (x509.load_pem_x509_certificate(each) for each in (certificate, authority))
+    except _MALFORMED as error:
+        raise ValueError(str(error)) from error
+    try:
+        issued.verify_directly_issued_by(issuer)
+    except (InvalidSignature, TypeError, ValueError):
+        # Another key, a key that signs nothing, another name.
+        return False
+    return True
 
 
 def _issue_leaf(

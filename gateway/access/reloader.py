@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final, NoReturn
 
-from common.ca import KeyPair, certificate_info
+from common.ca import KeyPair, certificate_info, is_issued_by
 from common.errors import UserError
 from gateway.access.command import credentials_command
 from gateway.access.directory import CredentialDirectory, KeyPairFiles, read_public
@@ -46,11 +46,14 @@ class TlsFiles:
         certificate: of the gateway.
         key: of that certificate.
         client_ca: certificate of the CA of client certificates; None requests no certificate from clients.
+        issuer: certificate of the robot's CA, where it must have issued the gateway's; None where that is
+            another one's.
     """
 
     certificate: Path
     key: Path
     client_ca: Path | None = None
+    issuer: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +94,8 @@ def _with_certificates(store: Store, tls: TlsFiles | None) -> LoadedAccess:
     if tls is None:
         return LoadedAccess(store, None, {})
     server = KeyPairFiles(tls.certificate, tls.key, "server certificate").read()
+    if tls.issuer:
+        _check_issuer(server.certificate, tls.certificate, tls.issuer)
     client_ca = read_public(tls.client_ca, "certificate authority") if tls.client_ca else None
     try:
         ends_s = {"server_certificate": certificate_info(server.certificate).ends_s}
@@ -101,6 +106,24 @@ def _with_certificates(store: Store, tls: TlsFiles | None) -> LoadedAccess:
             f"the certificate authority {tls.client_ca} can't be parsed: {error}", "It must be PEM"
         ) from error
     return LoadedAccess(store, TlsMaterial(server, client_ca), ends_s)
+
+
+def _check_issuer(certificate: bytes, file: Path, authority: Path) -> None:
+    """Raises a UserError if laptops, which know the robot's CA, would not trust the certificate.
+
+    So it is after a crash in the middle of `rotate ca`, where each certificate has its key.
+    """
+    try:
+        issued = is_issued_by(certificate, read_public(authority, "certificate authority"))
+    except ValueError as error:
+        raise UserError(
+            f"the certificate authority {authority} can't be parsed: {error}", "It must be PEM"
+        ) from error
+    if not issued:
+        raise UserError(
+            f"{file} was not issued by the certificate authority {authority}, so that no laptop trusts it",
+            f"Type: {credentials_command('rotate server', authority.parent)}",
+        )
 
 
 class CredentialReloader:
@@ -125,7 +148,7 @@ class CredentialReloader:
         self._tls = tls
         self._files = [directory.store_file]
         if tls:
-            self._files += [each for each in (tls.certificate, tls.key, tls.client_ca) if each]
+            self._files += [each for each in (tls.certificate, tls.key, tls.client_ca, tls.issuer) if each]
         self._on_change = on_change
         self._seen = self._signatures()
         self.loaded = load_access(directory, tls)

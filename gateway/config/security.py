@@ -62,7 +62,8 @@ class SecuritySettings(Section):
     def access_files(self) -> tuple[CredentialDirectory, TlsFiles | None] | None:
         """Returns where credentials and certificates are; None if callers are not authenticated.
 
-        The certificates are those named here, else those of the directory; None without TLS.
+        The certificates are those named here, else those of the directory, where the robot's CA must have
+        issued the gateway's; None without TLS.
         """
         if self.credentials is None:
             return None
@@ -70,9 +71,10 @@ class SecuritySettings(Section):
         if not tls.enabled:
             return files, None
         client_ca = (tls.client_ca or files.ca.certificate) if tls.client_certificates else None
-        return files, TlsFiles(
-            tls.certificate or files.server.certificate, tls.key or files.server.key, client_ca
-        )
+        own = files.server
+        certificate = tls.certificate or own.certificate
+        issuer = files.ca.certificate if certificate == own.certificate else None
+        return files, TlsFiles(certificate, tls.key or own.key, client_ca, issuer)
 
     @model_validator(mode="after")
     def _need_credentials(self) -> Self:

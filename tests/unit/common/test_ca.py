@@ -14,6 +14,7 @@ from cryptography.x509.verification import PolicyBuilder, Store, VerificationErr
 from common.ca import (
     KeyPair,
     certificate_info,
+    is_issued_by,
     issue_client_certificate,
     issue_server_certificate,
     key_matches,
@@ -75,6 +76,15 @@ def test_keys_match_their_certificates_and_are_in_no_repr() -> None:
     assert key_matches(one)
     assert not key_matches(type(one)(one.certificate, other.key))
     assert "PRIVATE" not in repr(one)
+
+
+def test_an_issuer_is_known_by_its_key_and_not_by_its_name() -> None:
+    issued = issue_server_certificate(CA, "lab", ("lab.local",), 1).certificate
+    assert is_issued_by(issued, CA.certificate)
+    assert not is_issued_by(issued, new_ca("lab", 1).certificate)
+    assert not is_issued_by(issued, new_ca("other", 1).certificate)
+    with pytest.raises(ValueError, match="PEM"):
+        is_issued_by(issued, b"damaged")
 
 
 def test_an_invalid_host_is_one_line() -> None:

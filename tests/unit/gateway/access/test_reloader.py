@@ -1,7 +1,10 @@
 """Reloading: changes take effect, and files that can't be read leave the last good version in effect."""
 
 import asyncio
+import re
 import time
+from contextlib import suppress
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -11,6 +14,7 @@ from gateway.access.credential_admin import CredentialAdmin, CredentialRequest
 from gateway.access.directory import CredentialDirectory
 from gateway.access.reloader import CredentialReloader, LoadedAccess, TlsFiles, load_access
 from gateway.access.role import Role
+from gateway.config import SecuritySettings
 
 
 @pytest.fixture
@@ -21,7 +25,12 @@ def directory(tmp_path: Path) -> CredentialDirectory:
 
 
 def tls_of(directory: CredentialDirectory) -> TlsFiles:
-    return TlsFiles(directory.server.certificate, directory.server.key, directory.ca.certificate)
+    return TlsFiles(
+        directory.server.certificate,
+        directory.server.key,
+        directory.ca.certificate,
+        directory.ca.certificate,
+    )
 
 
 async def test_a_new_credential_is_loaded_at_once_and_reported_once(directory: CredentialDirectory) -> None:
@@ -100,3 +109,96 @@ def test_a_key_of_another_certificate_is_refused(directory: CredentialDirectory)
     tls = TlsFiles(directory.server.certificate, directory.ca.key)
     with pytest.raises(UserError, match="is not the key of"):
         load_access(directory, tls)
+
+
+class Crash(BaseException):
+    """The end of a program that can do nothing more, as a power loss is."""
+
+
+def rotate_ca_until_it_has_replaced(
+    files: int, directory: CredentialDirectory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replace, replaced = Path.replace, count()
+
+    def replace_or_crash(path: Path, target: Path) -> Path:
+        if next(replaced) == files:
+            raise Crash
+        return replace(path, target)
+
+    with monkeypatch.context() as patched, suppress(Crash):
+        patched.setattr(Path, "replace", replace_or_crash)
+        CredentialAdmin(directory, "lab").rotate_ca(None)
+
+
+def problem_of(directory: CredentialDirectory) -> str:
+    """What a start says; empty if the gateway starts."""
+    access_files = SecuritySettings(credentials=directory.path).access_files()
+    assert access_files
+    try:
+        load_access(*access_files)
+    except UserError as error:
+        return f"{error.what}. {error.remedy}"
+    return ""
+
+
+@pytest.mark.parametrize(
+    ("replaced", "problem"),
+    [
+        (0, ""),
+        (1, "is not the key of"),
+        (2, "was not issued by the certificate authority"),
+        (3, "was not issued by the certificate authority"),
+        # The new CA is complete: only the list does not say yet what it has ended.
+        (4, ""),
+        (5, ""),
+    ],
+)
+def test_half_a_rotation_of_the_ca_is_said_and_mended_by_what_is_proposed(
+    directory: CredentialDirectory, monkeypatch: pytest.MonkeyPatch, replaced: int, problem: str
+) -> None:
+    rotate_ca_until_it_has_replaced(replaced, directory, monkeypatch)
+    found = problem_of(directory)
+    assert problem in found
+    assert bool(found) == bool(problem)
+    admin = CredentialAdmin(directory, "lab")
+    commands = {"server": admin.rotate_server, "ca": admin.rotate_ca}
+    typed = []
+    while match := re.search(r"[Tt]ype: robot-gateway credentials rotate (\w+)", found):
+        typed.append(match[1])
+        assert len(typed) <= 2, "each command mends something"
+        try:
+            commands[match[1]](None)
+        except UserError as error:
+            found = f"{error.what}. {error.remedy}"
+        else:
+            found = problem_of(directory)
+    assert found == ""
+
+
+async def test_half_a_rotation_changes_nothing_in_a_gateway_that_runs(
+    directory: CredentialDirectory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    changes: list[LoadedAccess] = []
+    reloader = CredentialReloader(directory, tls_of(directory), changes.append)
+    before = reloader.loaded
+    rotate_ca_until_it_has_replaced(2, directory, monkeypatch)
+    for _ in range(3):
+        await reloader.reload_for_unknown()
+    assert (reloader.loaded, changes) == (before, [])
+    assert "was not issued by" in reloader.view().credentials_error
+    # What completes it may leave the gateway's files as they are.
+    CredentialAdmin(directory, "lab").rotate_ca(None)
+    await reloader.reload_for_unknown()
+    assert len(changes) == 1
+    assert reloader.view().credentials_error == ""
+
+
+def test_a_certificate_of_another_authority_needs_none_of_the_robots(
+    directory: CredentialDirectory, tmp_path: Path
+) -> None:
+    bought = CredentialDirectory(tmp_path / "bought")
+    CredentialAdmin(bought, "elsewhere").initialize(("localhost",))
+    tls = {"certificate": bought.server.certificate, "key": bought.server.key}
+    access_files = SecuritySettings.model_validate({"credentials": directory.path, "tls": tls}).access_files()
+    assert access_files
+    assert load_access(*access_files).tls
