@@ -55,13 +55,19 @@ class Repeats:
     Args:
         write: records an action, which may stand for several.
         clock: monotonic seconds.
+        max_kinds: different actions of one caller with a fold each; further ones share one per result.
     """
 
     def __init__(
-        self, write: Callable[[ControlAction], None], clock: Callable[[], float] = time.monotonic
+        self,
+        write: Callable[[ControlAction], None],
+        clock: Callable[[], float] = time.monotonic,
+        *,
+        max_kinds: int = MAX_KINDS,
     ) -> None:
         self._write = write
         self._clock = clock
+        self._max_kinds = max_kinds
         self._callers: dict[str, _Caller] = {}
 
     def take(self, action: ControlAction, address_prefix: str, *, authenticated: bool = True) -> None:
@@ -76,7 +82,7 @@ class Repeats:
         caller = self._caller(action.who if authenticated else "", address_prefix, now_s)
         what = action.motion.device if action.motion else action.request
         kind: Hashable = replace(action, address=address_prefix, request=what, request_id="")
-        if kind not in caller.folds and len(caller.folds) >= MAX_KINDS:
+        if kind not in caller.folds and len(caller.folds) >= self._max_kinds:
             kind = action.result
         new = kind not in caller.folds
         fold = caller.folds.setdefault(kind, _Fold())

@@ -24,6 +24,7 @@ AUDIT = AuditSettings()
         f"loses the actions of the last {WINDOW_S:.0f} s that were only counted",
         f"{MAX_CALLERS} callers have a bucket each",
         f"{MAX_OLDER_ACTIONS} actions that were not refused stay after they have left the ring of {CAPACITY}",
+        f"one bucket of events, which admits {BURST}, then 1 a minute",
         f"{2 * AUDIT.max_kib * AUDIT.generations // 1024} MiB in all by default",
     ],
 )

@@ -54,6 +54,9 @@ class Audit(Interceptor[CallContext]):
         self._done = Repeats(partial(self._write, done), clock)
         self._refused = Repeats(partial(self._write, refused), clock)
         self._moved = Repeats(partial(self._write, done), clock)
+        self._strangers = Repeats(self._note, clock, max_kinds=0)
+        """For the events of refused strangers, all of them as one caller that does one thing: there may be
+        more addresses than the ring of events has places."""
 
     def applies_to(self, method: Method) -> bool:
         """Returns whether the method is a control action."""
@@ -129,13 +132,17 @@ class Audit(Interceptor[CallContext]):
 
     def record_due(self) -> None:
         """Records repeated actions whose time has come; to be called a few times a second."""
-        for each in (self._done, self._refused, self._moved):
+        for each in self._all:
             each.record_due()
 
     def record_all(self) -> None:
         """Records the repeated actions that are still only counted, at the end of the program."""
-        for each in (self._done, self._refused, self._moved):
+        for each in self._all:
             each.record_all()
+
+    @property
+    def _all(self) -> tuple[Repeats, ...]:
+        return self._done, self._refused, self._moved, self._strangers
 
     def _record(self, call: CallContext, result: ControlResult, answer: str) -> None:
         principal = call.principal
@@ -151,12 +158,18 @@ class Audit(Interceptor[CallContext]):
             request_id=request_id.current(),
         )
         self._repeats(result).take(action, call.peer.address_prefix)
+        if _is_strangers_refusal(action):
+            self._strangers.take(action, "")
 
     def _repeats(self, result: ControlResult) -> Repeats:
         return self._refused if result is ControlResult.REFUSED else self._done
 
     def _write(self, sink: AuditSink, action: ControlAction) -> None:
         sink.record(action)
+        if not _is_strangers_refusal(action):
+            self._note(action)
+
+    def _note(self, action: ControlAction) -> None:
         self._events.note(_event(action))
 
 
@@ -185,6 +198,10 @@ class AuditStart(Interceptor[CallContext]):
     def on_end(self, call: CallContext, _error: BaseException | None) -> None:
         """Forgets the call."""
         self._started.discard(call)
+
+
+def _is_strangers_refusal(action: ControlAction) -> bool:
+    return action.result is ControlResult.REFUSED and not action.who
 
 
 def _answer(call: CallContext) -> str:

@@ -12,19 +12,20 @@ from common.errors import InvalidRequestError, NotAllowedError, NotAuthenticated
 from common.interceptors import Interceptor
 from common.reasons import Reason
 from gateway.access.credential import Principal
-from gateway.access.repeats import BURST, WINDOW_S
+from gateway.access.repeats import BURST, MAX_KINDS, WINDOW_S
 from gateway.access.role import Role
 from gateway.rpc.calls.call import CallContext
 from gateway.rpc.interceptors.audit import Audit, AuditStart
 from gateway.rpc.interceptors.validation import Validation
 from gateway.status.event import ControlAction, ControlResult, Event
+from gateway.status.event_log import CAPACITY
 from gateway.status.fault import Severity
 from gateway.status.teleop import DriveEpisode
 from gateway.teleop.episodes import Episodes
 from gateway.teleop.lease import Driver
 from omniseer.gateway.v1.preview_pb2 import PREVIEW_PROFILE_LOW_BW
 from omniseer.gateway.v1.robot_gateway_pb2 import SetPreviewModeRequest, SetPreviewModeResponse
-from tests.support.calls import call_of, serve
+from tests.support.calls import PEER, call_of, serve
 
 ON = SetPreviewModeRequest(enabled=True)
 CLOCK = r"\d\d:\d\d:\d\d"
@@ -71,6 +72,7 @@ class Ground:
         request: bytes = ON.SerializeToString(),
         auth: Authenticated | None = None,
         method: str = "SetPreviewMode",
+        peer: str = PEER,
     ) -> None:
         async def behavior(_request: Any, _call: CallContext) -> SetPreviewModeResponse | bytes:
             if isinstance(outcome, BaseException):
@@ -78,7 +80,7 @@ class Ground:
             return outcome
 
         chain = [self.audit, auth or Authenticated(ANNA), Validation(10_000)]
-        await serve(chain, method, behavior, request)
+        await serve(chain, method, behavior, request, peer=peer)
 
 
 async def recorded(
@@ -269,6 +271,36 @@ async def test_a_flood_fills_neither_log_nor_events_and_is_recorded_by_its_numbe
     assert [each.count for each in log.actions] == [1] * BURST + [20]
     assert re.search(rf" \(calls: 20, {CLOCK} to {CLOCK} UTC\)$", ground.records.events[-1].message)
     assert len(ground.records.actions) + len(ground.refused.actions) == BURST + 1
+
+
+async def test_refusals_of_strangers_at_70_addresses_leave_room_for_other_events() -> None:
+    """Ten each, and eight kinds besides: in the file all of them, and more than the ring of events has."""
+    ground, addresses, minutes = Ground(), 70, 10
+    kinds = [*["no credential"] * BURST, *(f"kind {number}" for number in range(MAX_KINDS))]
+    for _ in range(minutes):
+        for number in range(addresses):
+            for kind in kinds:
+                auth = Authenticated(None, NotAuthenticatedError(kind, Reason.CREDENTIAL_UNKNOWN))
+                with pytest.raises(NotAuthenticatedError):
+                    await ground.call(SetPreviewModeResponse(), auth=auth, peer=f"ipv4:10.1.0.{number}:4")
+        ground.now_s += WINDOW_S
+        ground.audit.record_due()
+    assert len(ground.refused.actions) > CAPACITY
+    assert len(ground.records.events) <= BURST + minutes
+    assert "10.1.0.69:4 and others called SetPreviewMode" in ground.records.events[-1].message
+    ground.audit.record_all()
+    shown = [each.detail for each in ground.records.events if isinstance(each.detail, ControlAction)]
+    calls = minutes * addresses * len(kinds)
+    assert sum(each.count for each in shown) == sum(each.count for each in ground.refused.actions) == calls
+
+
+async def test_refusals_of_strangers_hold_no_event_of_a_name_back() -> None:
+    ground = Ground()
+    for principal in (*[None] * (BURST + 5), ANNA):
+        with pytest.raises(NotAllowedError):
+            await ground.call(SetPreviewModeResponse(), auth=Authenticated(principal, NotAllowedError("no")))
+    assert len(ground.records.events) == BURST + 1
+    assert ground.records.events[-1].message.startswith("anna called")
 
 
 async def test_an_action_that_was_held_back_alone_is_an_event_with_its_time(
