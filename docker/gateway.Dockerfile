@@ -57,7 +57,7 @@ RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh 
  && .cache/tools/bin/uv pip install --quiet --require-hashes --compile-bytecode --python .venv/bin/python \
       -r requirements/gateway.txt -r requirements/recorder.txt
 COPY interfaces/omniseer_msgs interfaces/omniseer_msgs
-COPY docker/build-interfaces-ros docker/refuse-stand-ins docker/
+COPY docker/build-interfaces-ros docker/
 # Release 4.6.1. A commit names its content, as a checksum does.
 ARG YOLO_ROS_REPOSITORY=https://github.com/mgonzs13/yolo_ros.git
 ARG YOLO_ROS_COMMIT=e712bdee9c5fcffb5e42a17b28792de004224964
@@ -65,6 +65,10 @@ RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh 
  && docker/build-interfaces-ros
 
 FROM rclpy-${ROS} AS built
+# 1 for images that no robot runs: those of tests, and of a try without a robot. The wheels' environment has stand-ins.
+ARG ALLOW_STAND_INS=
+COPY docker/refuse-stand-ins docker/
+RUN [ "$ALLOW_STAND_INS" = 1 ] || docker/refuse-stand-ins /opt
 COPY pyproject.toml README.md LICENSE ./
 COPY bridge bridge
 COPY common common
