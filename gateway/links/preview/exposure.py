@@ -41,7 +41,11 @@ def video_exposure(settings: GatewaySettings, listener: Listener) -> Finding:
     if settings.encrypts_preview(listener.address):
         return good("video", f"the video is encrypted; its listener is at {at}")
     if is_loopback(listener.address):
-        return good("video", f"the video is not encrypted; only this machine reaches its listener at {at}")
+        return good(
+            "video",
+            f"the video is not encrypted; its listener at {at} is for this machine alone. Docker before 28 "
+            "lets neighbours of the same network segment reach it: preview.encrypted: true keeps them out",
+        )
     cause = (
         "preview.encrypted is false" if settings.preview.encrypted is False else "security.insecure is set"
     )
@@ -50,5 +54,5 @@ def video_exposure(settings: GatewaySettings, listener: Listener) -> Finding:
         f"the video is not encrypted; anyone who reaches its listener at {at} can watch",
         f"{cause} in the gateway's configuration",
         "Remove that setting, or let this machine alone reach the listener: 'srt: {bind: 127.0.0.1}' in the "
-        "preview's configuration, with containers PREVIEW_BIND=127.0.0.1 in .env",
+        "preview's configuration, with containers (Docker 28 or newer) PREVIEW_BIND=127.0.0.1 in .env",
     )

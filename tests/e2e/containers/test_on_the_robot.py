@@ -74,7 +74,7 @@ def plain_player_is_refused(port: int) -> bool:
         (
             "127.0.0.1",
             False,
-            "the video is not encrypted; only this machine reaches its listener at 127.0.0.1",
+            "the video is not encrypted; its listener at 127.0.0.1",
         ),
     ],
 )

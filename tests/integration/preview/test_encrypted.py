@@ -77,9 +77,9 @@ EVERYWHERE = {"bind": "0.0.0.0"}  # noqa: S104  # what this test is about
             False,
             "anyone who reaches its listener at 0.0.0.0, UDP port {} can watch (security.insecure is set",
         ),
-        ({}, {}, False, "the video is not encrypted; only this machine reaches its listener at 127.0.0.1"),
+        ({}, {}, False, "the video is not encrypted; its listener at 127.0.0.1"),
         # As in a container: bound to all of its own addresses, and published on one of the machine's.
-        (EVERYWHERE | {"published_on": "127.0.0.1"}, {}, False, "only this machine reaches its listener"),
+        (EVERYWHERE | {"published_on": "127.0.0.1"}, {}, False, "is for this machine alone"),
         (EVERYWHERE | {"published_on": "10.0.0.5"}, {}, True, "its listener is at 10.0.0.5, UDP port {}"),
     ],
 )

@@ -169,9 +169,9 @@ def test_credentials_are_looked_at_as_the_gateway_does(tmp_path: Path) -> None:
         ({}, {}, "0.0.0.0", Verdict.GOOD, "is encrypted; its listener is at 0.0.0.0, UDP port 7100"),  # noqa: S104  # data
         ({}, {}, "::", Verdict.GOOD, "is encrypted; its listener is at [::], UDP port 7100"),
         ({}, {}, "", Verdict.GOOD, "is encrypted; its listener is at an unknown address, UDP port 7100"),
-        ({}, {}, "127.0.0.1", Verdict.GOOD, "is not encrypted; only this machine reaches"),
+        ({}, {}, "127.0.0.1", Verdict.GOOD, "is for this machine alone. Docker before 28"),
         ({}, {"encrypted": True}, "127.0.0.1", Verdict.GOOD, "is encrypted"),
-        ({}, {"encrypted": False}, "127.0.0.1", Verdict.GOOD, "is not encrypted; only this machine reaches"),
+        ({}, {"encrypted": False}, "127.0.0.1", Verdict.GOOD, "is for this machine alone. Docker before 28"),
         ({}, {"encrypted": False}, "10.0.0.5", Verdict.NOTE, "preview.encrypted is false"),
         ({"insecure": True}, {}, "10.0.0.5", Verdict.NOTE, "security.insecure is set"),
         ({"insecure": True}, {"encrypted": False}, "10.0.0.5", Verdict.NOTE, "preview.encrypted is false"),
@@ -197,8 +197,8 @@ def test_the_doctor_asks_the_service_where_its_listener_is(tmp_path: Path, behav
     with double_process(socket_path, Behaviour(behaviour)):
         (finding,) = (each for each in examine(config) if each.check == "video")
     if behaviour == "works":
-        assert finding.what == (
-            "the video is not encrypted; only this machine reaches its listener at 127.0.0.1, UDP port 7100"
+        assert finding.what.startswith(
+            "the video is not encrypted; its listener at 127.0.0.1, UDP port 7100 is for this machine alone"
         )
     else:
         assert finding.verdict is Verdict.NOTE
