@@ -45,13 +45,17 @@ _MAX_CONCURRENT_CALLS: Final = 4096
 are reset by HTTP/2, which a flooding caller may see as UNAVAILABLE."""
 
 
-def possible_connections(wanted: int) -> int:
-    """Returns how many connections to accept at once: at most half of the descriptors that there may be.
+def possible_connections(wanted: int, addresses: int = 1) -> int:
+    """Returns how many connections to accept at once: all together at most half of the possible descriptors.
 
     Each takes some 45 to 100 KiB with TLS besides, whatever it does.
+
+    Args:
+        wanted: at each address.
+        addresses: that the server listens at; each accepts as many.
     """
     descriptors, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
-    return wanted if descriptors == resource.RLIM_INFINITY else min(wanted, descriptors // 2)
+    return wanted if descriptors == resource.RLIM_INFINITY else min(wanted, descriptors // 2 // addresses)
 
 
 def new_server(

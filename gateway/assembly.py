@@ -184,7 +184,8 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     control = PreviewControl(link, settings.preview.settle_ms / 1000)
     stats = Stats([name for service in SERVICES for name in service.methods_by_name])
     events = Events()
-    max_connections = possible_connections(settings.limits.connections + _BESIDE_PLACES)
+    addresses = 2 if settings.grpc.socket else 1
+    max_connections = possible_connections(settings.limits.connections + _BESIDE_PLACES, addresses)
     admission = Admission(settings.limits, max_connections=max_connections)
     refusals = RefusalDelay()
     connection_guard = ConnectionGuard(admission)

@@ -1,6 +1,7 @@
 """Connections that only take room: few of them are kept, and not for long; operators do not notice them."""
 
 import asyncio
+import resource
 import socket
 import time
 from collections.abc import Iterator, Sequence
@@ -19,6 +20,8 @@ from common.reasons import Reason
 from common.rpc import new_server
 from console.client import NotAllowed
 from gateway.access.role import Role
+from gateway.assembly import ThisRobot, build
+from gateway.config import GatewaySettings
 from gateway.rpc.calls.call import peer_of
 from gateway.rpc.connections.accepted_sockets import UNLIMITED, AcceptedSockets
 from gateway.rpc.connections.admission import MAX_PENDING
@@ -165,6 +168,16 @@ def test_connections_do_not_take_the_descriptors_that_a_revocation_needs(tmp_pat
                 for _ in stream:
                     pass
             assert seen.value.reason == Reason.CREDENTIAL_REVOKED
+
+
+@pytest.mark.parametrize(("by_socket", "each"), [(False, 200), (True, 100)])
+def test_all_addresses_together_get_half_of_the_descriptors(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, by_socket: bool, each: int
+) -> None:
+    monkeypatch.setattr(resource, "getrlimit", lambda _which: (400, 400))
+    served = {"socket": tmp_path / "gateway.sock"} if by_socket else {}
+    settings = GatewaySettings.model_validate({"grpc": served, "sources": ()})
+    assert build(settings, ThisRobot(settings)).max_connections == each
 
 
 def test_only_connections_of_the_port_are_found_and_closed() -> None:

@@ -162,5 +162,6 @@ def test_connections_leave_descriptors_for_the_rest(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(resource, "getrlimit", lambda _which: (400, 400))
     assert rpc.possible_connections(1000) == 200
     assert rpc.possible_connections(100) == 100
+    assert rpc.possible_connections(1000, addresses=2) == 100, "both together no more than one"
     monkeypatch.setattr(resource, "getrlimit", lambda _which: (resource.RLIM_INFINITY, 0))
     assert rpc.possible_connections(1000) == 1000
