@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from fuzz.__main__ import NAMES
 from gateway.rpc.server import Interceptors
 
 ROOT = Path(__file__).parents[2]
@@ -101,3 +102,11 @@ def test_the_glossary_has_each_term_once_and_in_order() -> None:
     terms = [line.split("|")[1].strip().lower() for line in table.splitlines() if line.startswith("| ")][1:]
     assert len(terms) > 100
     assert terms == sorted(set(terms))
+
+
+def test_the_page_of_fuzzing_has_every_target_and_counts_their_inputs() -> None:
+    page = (ROOT / "docs/fuzzing.md").read_text(encoding="utf-8")
+    table = page.partition("| target | what it reads |\n|---|---|\n")[2].partition("\n\n")[0]
+    assert re.findall(r"^\| (\w+) \|", table, re.MULTILINE) == list(NAMES)
+    [(runs, millions)] = re.findall(r"--runs (\d+) +# a long one: ([\d.]+) million inputs", page)
+    assert int(runs) * len(NAMES) == round(float(millions) * 1e6)
