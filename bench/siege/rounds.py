@@ -39,6 +39,7 @@ class Outcome:
         revocation_s: from a revocation on the disk to the end of the last stream of the revoked, per turn.
         peaks: of the gateway's program.
         closed: connections that the gateway's guard has closed; None where that is not known.
+        unbesieged_mib: resident memory, peak before the first attack: the operator works, streams are open.
     """
 
     peaks: Peaks
@@ -49,6 +50,7 @@ class Outcome:
     attacks: list[Counts] = field(default_factory=list)
     revocation_s: list[float] = field(default_factory=list)
     closed: float | None = None
+    unbesieged_mib: float = 0.0
 
 
 async def besiege(ground: Ground, size: Size) -> Outcome:
@@ -78,6 +80,7 @@ async def besiege(ground: Ground, size: Size) -> Outcome:
                 _attack(ground, floods) as flooders,
             ):
                 outcome.besieged.append(operator.begin_record())
+                outcome.unbesieged_mib = outcome.unbesieged_mib or peaks.resident_mib
                 for each in (holders, flooders):
                     each.begin()
                 await asyncio.sleep(size.besieged_s / 2)
