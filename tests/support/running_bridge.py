@@ -2,7 +2,7 @@
 
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -41,7 +41,7 @@ class Received:
         """All that the gaps announce."""
         return self._announced(set(DropReason.values()))
 
-    def _announced(self, reasons: set[int]) -> set[tuple[str, int]]:
+    def _announced(self, reasons: Collection[int]) -> set[tuple[str, int]]:
         return {
             (batch.run_id, sequence)
             for batch in self.batches

@@ -12,7 +12,7 @@ from fleet.connection import connect
 from fleet.names import STATES
 from gateway.status.fault import Severity
 from omniseer.fleet.v1.state_pb2 import RobotState
-from omniseer.gateway.v1.system_status_pb2 import SystemStatus
+from omniseer.gateway.v1.system_status_pb2 import RobotHealth, SystemStatus
 from tests.support.event_server import EventServer
 from tests.support.eventually import eventually
 from tests.support.running_bridge import ROBOT, bridge_program, received
@@ -68,7 +68,7 @@ async def test_an_event_and_a_state_a_second_cost_a_hundredth_of_a_core_and_80_m
             before, began_s = process.cpu_times(), time.monotonic()
             for second in range(_S):
                 gateway.happen(1, Severity.INFO)
-                gateway.show(SystemStatus(health={"summary": f"second {second}"}))
+                gateway.show(SystemStatus(health=RobotHealth(summary=f"second {second}")))
                 await asyncio.to_thread(slowdown.sample)
                 await asyncio.sleep(began_s + second + 1 - time.monotonic())
             after, took_s = process.cpu_times(), time.monotonic() - began_s
