@@ -157,6 +157,15 @@ class State:
         """Whether the driver holds, by a command that is still valid."""
         return self.command is not None and self.command.held and now_ns <= self.command.valid_until_ns
 
+    def heard(self, now_ns: int) -> bool:
+        """Whether the driver of a stream is there: the newest command is still valid.
+
+        A lease alone proves no driver. It outlives the driver's program by up to 2 s, and a tool without a
+        stream has nobody behind it when its command is over.
+        """
+        streaming = self.lease is not None and self.lease.streaming
+        return streaming and self.command is not None and now_ns <= self.command.valid_until_ns
+
     @property
     def expires_ns(self) -> int | None:
         """When motion ends for want of a newer command; None while nothing moves."""
@@ -195,12 +204,12 @@ def reset_obstacle(state: State, now_ns: int) -> str:
     """Returns what keeps the stop from being reset, for people; empty if nothing does.
 
     A reset never moves the robot: not by its driver's hold, and not by leaving it to a source that has gone
-    on publishing. While a driver has the lease, zeros keep sources of lower priority away.
+    on publishing. While a driver is heard, zeros keep sources of lower priority away.
     """
-    surroundings = state.surroundings
+    surroundings, masked = state.surroundings, state.heard(now_ns)
     if state.holding(now_ns):
         return "the driver holds: release first"
-    if state.lease is None and surroundings.commanded_on:
+    if surroundings.commanded_on and not masked:
         topics = ", ".join(surroundings.commanded_on)
         return (
             f"another source commands motion on {topics}, and would move the robot: "
@@ -208,7 +217,7 @@ def reset_obstacle(state: State, now_ns: int) -> str:
         )
     if surroundings.outranked:
         return "another source moves the robot: end that first"
-    if state.lease is None and not surroundings.sources_known:
+    if not surroundings.sources_known and not masked:
         return (
             "it is not known yet what else commands the robot, so soon after the start or after another "
             "source has moved it: try again in 3 s"

@@ -158,13 +158,25 @@ def test_a_reset_does_not_leave_the_robot_to_autonomy_that_goes_on(robot: Drivin
         robot.settled()
         state = robot.state()
         assert "motion on /cmd_vel_autonomy" in state.reset_obstacle
-        peer.send(reset=state.stop.stop_id)
         began_ns = time.monotonic_ns()
-        wait_until(lambda: robot.state().monotonic_ns > began_ns + 1_000_000_000, "a second")
-        assert robot.state().phase == pb.PHASE_STOPPED
-        assert not robot.witness.motion_since(began_ns)
+
+        def nothing_follows_a_reset() -> None:
+            peer.send(reset=state.stop.stop_id)
+            since_ns = time.monotonic_ns()
+            wait_until(lambda: robot.state().monotonic_ns > since_ns + 1_000_000_000, "a second")
+            assert robot.state().phase == pb.PHASE_STOPPED
+            assert not robot.witness.motion_since(began_ns)
+
+        nothing_follows_a_reset()
         peer.send(lease="anna", held=False)
         wait_until(lambda: not robot.state().reset_obstacle, "a driver keeps it away")
+        # As when the driver's program has died: the lease is still there.
+        peer.send(silent=True)
+        wait_until(lambda: robot.state().reset_obstacle, "the driver is not heard any more")
+        assert robot.state().session_id
+        nothing_follows_a_reset()
+        peer.send(silent=False)
+        wait_until(lambda: not robot.state().reset_obstacle, "the driver is heard again")
         peer.send(reset=state.stop.stop_id)
         robot.phase_is("ARMED")
         assert not robot.witness.motion_since(began_ns)

@@ -312,6 +312,40 @@ def test_a_driver_who_keeps_other_sources_away_resets_the_stop() -> None:
     assert robot.feed(Reset(robot.stop_id)).phase is Phase.ARMED
 
 
+@pytest.mark.parametrize(
+    "source", [replace(CLEAR, commanded_on=("/cmd_vel_nav",)), replace(CLEAR, sources_known=False)]
+)
+def test_a_lease_without_a_driver_who_is_heard_keeps_no_source_away(source: Surroundings) -> None:
+    """The lease of a driver's program that is dead ends within 2 s, and leaves the robot to the source."""
+    robot = in_phase(Phase.STOPPED)
+    robot.feed(Observe(source))
+    robot.command(held=False)
+    robot.after(251)
+    assert reset_obstacle(robot.state, robot.now_ns)
+    assert robot.feed(Reset(robot.stop_id)).latch
+    robot.command(held=False)
+    robot.after(250)
+    assert robot.feed(Reset(robot.stop_id)).latch is None
+
+
+def test_a_lease_before_its_first_command_keeps_no_source_away() -> None:
+    robot = Robot()
+    robot.feed(Stop("ben"))
+    robot.feed(Observe(replace(CLEAR, commanded_on=("/cmd_vel_nav",))))
+    robot.feed(GrantLease(robot.lease))
+    assert robot.feed(Reset(robot.stop_id)).latch
+
+
+def test_an_older_tools_command_keeps_no_source_away() -> None:
+    """Its lease ends by itself, with nobody there."""
+    robot = Robot(streaming=False)
+    robot.feed(GrantLease(robot.lease))
+    robot.feed(Stop("ben"))
+    robot.feed(Observe(replace(CLEAR, commanded_on=("/cmd_vel_nav",))))
+    robot.command(held=False)
+    assert robot.feed(Reset(robot.stop_id)).latch
+
+
 def test_a_lost_driver_does_not_hide_who_stopped_the_robot() -> None:
     robot = in_phase(Phase.STOPPED)
     latch = robot.state.latch

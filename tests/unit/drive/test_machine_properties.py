@@ -213,14 +213,16 @@ class Driving(RuleBasedStateMachine):
         assert self.state.phase is Phase.STOPPED
         assert self.state.output == ZERO
 
-    @rule(bad=st.sampled_from("ocu"))
-    def reset_beside_another_source(self, bad: str) -> None:
+    @rule(bad=st.sampled_from("ocu"), silent_ms=st.sampled_from([0, 250, 251]))
+    def reset_beside_another_source(self, bad: str, silent_ms: int) -> None:
         """Stops, and resets while another source moves the robot, or would."""
         self.drive(held=False, velocity=ZERO, times=1)
         self.stop(by="anna")
         self.observe(running=True, newest_ms=0, base=True, bad=bad)
+        self.pass_time(silent_ms)
         self.reset(right=True)
-        assert (self.state.latch is None) == (bad != "o" and self.lease is not None)
+        streaming = self.lease is not None and self.lease.streaming
+        assert (self.state.latch is None) == (bad != "o" and streaming and silent_ms <= 250)
 
     @rule(right=st.booleans())
     def reset(self, right: bool) -> None:
@@ -345,7 +347,14 @@ class Driving(RuleBasedStateMachine):
             around = self.before.surroundings
             assert not around.outranked
             quiet = around.sources_known and not around.commanded_on
-            assert self.lease or quiet, "the reset would leave it to another source"
+            assert self.driver_is_heard() or quiet, "the reset would leave it to another source"
+
+    def driver_is_heard(self) -> bool:
+        """Whether the driver's program is there: a lease outlives it."""
+        if self.lease is None or self.newest is None:
+            return False
+        valid_until_ns = min(self.newest.valid_until_ns, self.arrived_ns + 250 * MS)
+        return self.lease.streaming and self.now_ns <= valid_until_ns
 
     def the_sequence_only_grows(self) -> None:
         before, after = self.before.command, self.state.command
