@@ -44,7 +44,7 @@ class Rules:
     """The configuration of the machine.
 
     Attributes:
-        release_ramp_s: duration of the slowing down after a voluntary release; 0 stops at once.
+        release_ramp_s: duration of the slowing down after the driver of a stream has released; 0 for none.
     """
 
     limits: Limits = field(default_factory=Limits)
@@ -340,7 +340,9 @@ def _moved(state: State, trigger: Trigger, now_ns: int) -> State:
     if trigger not in TRANSITIONS[state.phase]:
         return state
     phase = TRANSITIONS[state.phase][trigger] or _rest(state)
-    released_at = state.output or ZERO if trigger is Trigger.RELEASE else ZERO
+    # Without a stream the end of a command is its release, and motion ends with it.
+    slows_down = trigger is Trigger.RELEASE and state.heard(now_ns)
+    released_at = state.output or ZERO if slows_down else ZERO
     return replace(state, phase=phase, since_ns=now_ns, released_at=released_at)
 
 

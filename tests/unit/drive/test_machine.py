@@ -531,6 +531,22 @@ def test_a_configured_ramp_follows_a_release_and_nothing_else() -> None:
     assert robot.feed(Stop("ben")).output == ZERO
 
 
+@pytest.mark.parametrize("ends", ["by itself", "by a command without motion"])
+def test_an_older_tools_command_ends_without_a_ramp(ends: str) -> None:
+    """Motion for 500 ms is promised, with the slowing down."""
+    robot = Robot(Rules(release_ramp_s=0.5), streaming=False)
+    robot.feed(GrantLease(robot.lease))
+    robot.command(held=True, valid_until_ns=10**18)
+    robot.after(500)
+    assert robot.forward_mps > 0
+    if ends == "by itself":
+        robot.after(1)
+    else:
+        robot.command(held=False)
+    assert robot.state.phase is Phase.STOPPING
+    assert robot.state.output == ZERO
+
+
 def test_speed_follows_the_age_of_the_picture() -> None:
     robot = Robot().driving()
     robot.driven(1000)

@@ -262,18 +262,20 @@ class Driving(RuleBasedStateMachine):
 
     def motion_has_every_reason(self) -> None:
         state = self.state
-        if not self.moves() or state.phase is Phase.STOPPING:
+        if not self.moves():
             return
         lease, command, around = self.lease, self.newest, state.surroundings
-        assert state.phase is Phase.DRIVING
         assert self.enabled
         assert lease is not None
         assert lease == state.lease
         assert command is not None
-        assert command.held
         assert self.now_ns <= command.valid_until_ns
         assert self.now_ns <= self.arrived_ns + (250 if lease.streaming else 500) * MS
         assert state.latch is None
+        if state.phase is Phase.STOPPING:
+            return
+        assert state.phase is Phase.DRIVING
+        assert command.held
         assert around.base_present
         assert not around.robot_stopped
         assert not around.outranked
@@ -289,6 +291,10 @@ class Driving(RuleBasedStateMachine):
     def slowing_down_only_follows_a_release(self) -> None:
         if self.moves() and self.state.phase is Phase.STOPPING:
             assert self.configured.release_ramp_s > 0
+            assert self.lease
+            assert self.lease.streaming
+            assert self.newest
+            assert not self.newest.held
             assert not self.state.inhibits
             assert self.before.phase in {Phase.DRIVING, Phase.STOPPING}
             assert _no_faster(self.state.output, self.before.output)
