@@ -84,10 +84,12 @@ TRANSITIONS: Final[Mapping[Phase, Mapping[Trigger, Phase | None]]] = MappingProx
             Trigger.INHIBIT: Phase.INHIBITED,
             Trigger.RELEASE: Phase.STOPPING,
         },
-        # The zeros for the others start again when the lease ends.
+        # The zeros for the others start again when the lease ends, and when another driver gets it: the ramp
+        # of a release is only for the driver who has released.
         Phase.STOPPING: {
             **_STOP,
             Trigger.DISABLE: Phase.STOPPING,
+            Trigger.LEASE: Phase.STOPPING,
             Trigger.LEASE_ENDED: Phase.STOPPING,
             Trigger.INHIBIT: Phase.INHIBITED,
             Trigger.HOLD: Phase.DRIVING,

@@ -531,6 +531,18 @@ def test_a_configured_ramp_follows_a_release_and_nothing_else() -> None:
     assert robot.feed(Stop("ben")).output == ZERO
 
 
+def test_a_ramp_ends_when_another_driver_gets_the_lease() -> None:
+    robot = Robot(Rules(release_ramp_s=0.2)).driving()
+    robot.driven(1000)
+    robot.command(held=False)
+    robot.now_ns += 50 * MS
+    robot.command(held=False)
+    assert robot.forward_mps > 0
+    assert robot.feed(GrantLease(OTHER)).output == ZERO
+    assert robot.state.phase is Phase.STOPPING
+    assert robot.after(20).output == ZERO
+
+
 @pytest.mark.parametrize("ends", ["by itself", "by a command without motion"])
 def test_an_older_tools_command_ends_without_a_ramp(ends: str) -> None:
     """Motion for 500 ms is promised, with the slowing down."""
@@ -566,6 +578,7 @@ def _tests_of_the_table() -> list[Callable[[], None]]:
         ),
         *(partial(test_a_reset_ends_where_it_should, *rest) for rest in RESTS),
         partial(test_the_robot_is_handed_back_after_zeros, True, Phase.AVAILABLE),
+        test_a_ramp_ends_when_another_driver_gets_the_lease,
         *(
             partial(test_the_zeros_for_others_start_again_with_the_end_of_the_lease, end)
             for end in (EndLease("s1", LeaseEnd.CLOSED), Enable(enabled=False))

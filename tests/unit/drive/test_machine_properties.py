@@ -292,6 +292,7 @@ class Driving(RuleBasedStateMachine):
         if self.moves() and self.state.phase is Phase.STOPPING:
             assert self.configured.release_ramp_s > 0
             assert self.lease
+            assert self.lease == self.before.lease, "of the driver who has released, and of no other"
             assert self.lease.streaming
             assert self.newest
             assert not self.newest.held
