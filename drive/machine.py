@@ -77,7 +77,7 @@ class EndLease:
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """The robot is to be stopped, by whom and why, for people."""
+    """The robot is to be stopped, by whom and why, for people. Each stop has a number of its own."""
 
     by: str
     reason: str = ""
@@ -280,9 +280,10 @@ def _held_last(state: State, now_ns: int) -> bool:
 
 
 def _latched(state: State, by: str, reason: str) -> State:
-    """Returns the state with a latch; repeating a stop keeps its number, so that its reset can meet it."""
-    if state.latch and state.latch.by == by:
-        return replace(state, latch=replace(state.latch, reason=reason or state.latch.reason))
+    """Returns the state with a stop that has a number of its own, also where the same caller has stopped it.
+
+    Two people may share a credential: a reset that is on its way must not undo a stop that it has not seen.
+    """
     stop_id = state.last_stop_id + 1
     return replace(state, latch=Latch(stop_id, by, reason), last_stop_id=stop_id)
 

@@ -2,12 +2,13 @@
 
 import asyncio
 import time
-from collections.abc import Callable
-from typing import Final
+from dataclasses import dataclass
+from typing import Final, Self
 
 from common.backoff import Backoff
 from common.errors import DriveUnreachableError, PreconditionError
 from common.reasons import Reason
+from common.token_bucket import TokenBucket
 from gateway.links.drive.commands import DriveCommands
 from gateway.links.drive.state import DriveLink
 from gateway.status.teleop import DrivePhase, DriveView, StopLatch
@@ -18,8 +19,10 @@ HOW_TO_REACH: Final = (
     "start or restart robot-drive on the robot; the gateway connects by itself. Without the gateway's "
     "commands it publishes zeros, or nothing"
 )
-_SHARED_NS: Final = 100_000_000
-"""A caller who repeats a stop within this time gets the answer from memory, also if others stop meanwhile."""
+_AT_ONCE: Final = 10.0
+_PER_S: Final = 10.0
+"""So many stops of one caller at once, and so many more a second, get a number each. Those beyond get the
+stop in force: no person is so fast, and a flood costs the drive program no more."""
 _RETRY_FIRST_S: Final = 0.005
 _RETRY_LONGEST_S: Final = 0.05
 """While the connection to the drive program takes no more."""
@@ -51,6 +54,56 @@ class Copies:
         self._stops.setdefault((by, request_id), (now_ns, stop))
 
 
+class Pace:
+    """Which stops of a caller are beyond what the drive program is sent."""
+
+    def __init__(self) -> None:
+        self._buckets: dict[str, TokenBucket] = {}
+
+    def beyond(self, by: str, now_s: float) -> bool:
+        """Counts a stop of a caller, and returns whether it is one too many."""
+        # Those that are full again say nothing.
+        full_after_s = _AT_ONCE / _PER_S
+        self._buckets = {
+            name: bucket for name, bucket in self._buckets.items() if now_s - bucket.updated_s < full_after_s
+        }
+        bucket = self._buckets.setdefault(by, TokenBucket(_AT_ONCE, now_s))
+        return not bucket.take(now_s, capacity=_AT_ONCE, refill_per_s=_PER_S)
+
+    def forget(self) -> None:
+        """Begins anew."""
+        self._buckets.clear()
+
+
+@dataclass(frozen=True, slots=True)
+class _Sent:
+    """When a stop was sent, and what the drive program had reported until then.
+
+    Attributes:
+        instance_id: its process; empty before the first report.
+        stops: that this process had taken.
+    """
+
+    at_ns: int
+    instance_id: str
+    stops: int
+
+    @classmethod
+    def now(cls, view: DriveView) -> Self:
+        """Returns it for a stop that is about to be sent."""
+        actual = view.actual
+        if actual is None:
+            return cls(time.monotonic_ns(), "", 0)
+        return cls(time.monotonic_ns(), actual.instance_id, actual.counters.stops)
+
+    def taken(self, view: DriveView) -> bool:
+        """Returns whether the drive program has taken a stop since: no reset on its way has seen its number."""
+        actual = view.actual
+        if actual is None or not view.reachable or actual.monotonic_ns < self.at_ns:
+            return False
+        return actual.counters.stops > (self.stops if actual.instance_id == self.instance_id else 0)
+
+
 class Stops:
     """Stops the robot, for anyone, and resets that.
 
@@ -62,16 +115,18 @@ class Stops:
     def __init__(self, link: DriveLink, commands: DriveCommands) -> None:
         self._link = link
         self._commands = commands
-        self._stopped_ns: dict[str, int] = {}
-        """When each caller's newest stop was confirmed; empty after a reset."""
-        self._sent_ns: dict[str, int] = {}
-        """When each caller's stop was sent that is not confirmed yet."""
+        self._pace = Pace()
+        """Of callers while the stop in force holds; anew after a reset."""
+        self._sent: dict[str, _Sent] = {}
+        """Each caller's stop that was sent and is not confirmed yet."""
         self._copies = Copies()
 
     async def stop(self, by: str, reason: str, request_id: str = "") -> StopLatch:
         """Stops the robot, and returns the stop when the drive program has confirmed it.
 
-        A copy of a request whose stop was confirmed returns that one, reset or not, and stops nothing anew.
+        Each request gets a stop of its own, which only a reset that has seen it undoes: two people may share
+        a credential. A copy of a request whose stop was confirmed returns that one, reset or not, and stops
+        nothing anew.
 
         Args:
             by: who, for people.
@@ -81,38 +136,34 @@ class Stops:
         Raises:
             DriveUnreachableError: it has not.
         """
-        stop, now_ns = self._link.view.stop, time.monotonic_ns()
+        view, now_ns = self._link.view, time.monotonic_ns()
         if first := self._copies.first(by, request_id, now_ns):
             return first
-        recent = now_ns - self._stopped_ns.get(by, -_NS_PER_S) < _SHARED_NS
-        if stop and recent and self._link.view.reachable:
-            # Repeated by the same caller, perhaps very often: one confirmation serves all. A newer stop of
-            # another caller holds the robot as well as its own.
-            self._copies.confirmed(by, request_id, stop, now_ns)
-            return stop
-        stop = await self._stop_anew(by, reason, now_ns)
+        if view.stop and view.reachable and self._pace.beyond(by, now_ns / _NS_PER_S):
+            stop = view.stop
+        else:
+            stop = await self._stop_anew(by, reason)
         self._copies.confirmed(by, request_id, stop, now_ns)
         return stop
 
-    async def _stop_anew(self, by: str, reason: str, now_ns: int) -> StopLatch:
-        """Sends a stop, unless one of the same caller is on its way, and waits until it is confirmed."""
-        if sent_ns := self._sent_ns.get(by):
-            await self._wait_for_confirmation(sent_ns)
+    async def _stop_anew(self, by: str, reason: str) -> StopLatch:
+        """Sends a stop, unless one of the same caller is on its way, and waits until it is confirmed.
+
+        Nobody has seen the number of one that is on its way.
+        """
+        if sent := self._sent.get(by):
+            await self._wait_for_confirmation(sent)
         else:
+            sent = _Sent.now(self._link.view)
             await self._send(by, reason)
-            self._sent_ns[by] = now_ns
+            self._sent[by] = sent
             try:
-                await self._wait_for_confirmation(now_ns)
+                await self._wait_for_confirmation(sent)
             finally:
-                self._sent_ns.pop(by, None)
+                self._sent.pop(by, None)
         stop = self._link.view.stop
         if stop is None:
             raise DriveUnreachableError(f"the stop is already reset; stop again, or {HOW_TO_REACH}")
-        confirmed_ns = time.monotonic_ns()
-        self._stopped_ns = {
-            name: at_ns for name, at_ns in self._stopped_ns.items() if confirmed_ns - at_ns < _SHARED_NS
-        }
-        self._stopped_ns[by] = confirmed_ns
         return stop
 
     async def _send(self, by: str, reason: str) -> None:
@@ -124,8 +175,12 @@ class Stops:
                 raise DriveUnreachableError(f"the robot's drive program can't be reached: {HOW_TO_REACH}")
             await asyncio.sleep(retry.next_s())
 
-    async def _wait_for_confirmation(self, since_ns: int) -> None:
-        if not await self._confirmed(since_ns, lambda view: view.phase is DrivePhase.STOPPED):
+    async def _wait_for_confirmation(self, sent: _Sent) -> None:
+        def confirmed() -> bool:
+            view = self._link.view
+            return sent.taken(view) and view.phase is DrivePhase.STOPPED
+
+        if not await self._link.changes.wait_until(confirmed, CONFIRMED_WITHIN_S):
             raise DriveUnreachableError(
                 f"the robot's drive program has not confirmed the stop: {HOW_TO_REACH}"
             )
@@ -148,9 +203,11 @@ class Stops:
                 f"the present stop is {stop.stop_id}, by {stop.by}" if stop else "the robot is not stopped"
             )
             raise PreconditionError(f"stop {stop_id} can't be reset: {present}", Reason.STOP_NOT_RESET)
-        self._stopped_ns.clear()
+        self._pace.forget()
         sent = self._commands.reset(stop_id)
-        if not sent or not await self._confirmed(now_ns, lambda _: True):
+        if not sent or not await self._link.changes.wait_until(
+            lambda: self._has_reported(now_ns), CONFIRMED_WITHIN_S
+        ):
             raise DriveUnreachableError(f"the robot's drive program does not answer: {HOW_TO_REACH}")
         view = self._link.view
         newer = view.stop
@@ -163,12 +220,7 @@ class Stops:
             return f"stop {stop_id} is reset; the robot was stopped again by {newer.by}"
         return "the stop is reset; the driver has to release and to hold again"
 
-    async def _confirmed(self, since_ns: int, reached: Callable[[DriveView], bool]) -> bool:
-        """Waits for a report that is newer than an instant and for which `reached` holds."""
-
-        def holds() -> bool:
-            view = self._link.view
-            fresh = view.actual is not None and view.actual.monotonic_ns >= since_ns
-            return view.reachable and fresh and reached(view)
-
-        return await self._link.changes.wait_until(holds, CONFIRMED_WITHIN_S)
+    def _has_reported(self, since_ns: int) -> bool:
+        """Whether the drive program has reported since an instant."""
+        view = self._link.view
+        return view.reachable and view.actual is not None and view.actual.monotonic_ns >= since_ns

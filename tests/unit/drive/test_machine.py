@@ -28,6 +28,7 @@ from drive.values import (
     ZERO,
     Command,
     Inhibit,
+    Latch,
     Lease,
     LeaseEnd,
     Supervision,
@@ -375,13 +376,13 @@ def test_the_zeros_for_others_start_again_with_the_end_of_the_lease(end: Event) 
     assert robot.after(1).phase in {Phase.AVAILABLE, Phase.DISABLED}
 
 
-def test_a_stop_of_another_person_needs_a_reset_of_its_own() -> None:
+@pytest.mark.parametrize("by", ["carl", "ben"], ids=["another", "the same, perhaps of two people"])
+def test_each_stop_needs_a_reset_that_has_seen_it(by: str) -> None:
     robot = in_phase(Phase.STOPPED)
     first = robot.stop_id
     robot.command(held=False)
-    robot.feed(Stop("ben", "again"))
-    assert robot.stop_id == first, "the same person"
-    robot.feed(Stop("carl"))
+    robot.feed(Stop(by, "again"))
+    assert robot.state.latch == Latch(first + 1, by, "again")
     assert robot.feed(Reset(first)).phase is Phase.STOPPED
     assert robot.feed(Reset(robot.stop_id)).phase is not Phase.STOPPED
 

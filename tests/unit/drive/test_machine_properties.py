@@ -209,9 +209,12 @@ class Driving(RuleBasedStateMachine):
 
     @rule(by=st.sampled_from(["anna", "ben"]))
     def stop(self, by: str) -> None:
+        number = self.state.last_stop_id
         self.feed(Stop(by))
         assert self.state.phase is Phase.STOPPED
         assert self.state.output == ZERO
+        assert self.state.latch
+        assert self.state.latch.stop_id > number, "no reset has seen it"
 
     @rule(bad=st.sampled_from("ocu"), silent_ms=st.sampled_from([0, 250, 251]))
     def reset_beside_another_source(self, bad: str, silent_ms: int) -> None:

@@ -176,19 +176,23 @@ async def test_anyone_may_stop_and_only_that_stop_is_reset(
         stopped = await client.stop_robot("a child on the track")
         assert stopped.stop.reason == "a child on the track"
         await comes_to_rest(robot)
-        assert (await client.stop_robot("again")).stop.stop_id == stopped.stop.stop_id
+        again = await client.stop_robot("again")
+        assert again.stop.stop_id > stopped.stop.stop_id, "perhaps of another person with the same credential"
+        with pytest.raises(Refused) as refused:
+            await client.reset_stop(stopped.stop.stop_id)
+        assert refused.value.reason == Reason.STOP_NOT_RESET
         await in_phase(session, DrivePhase.STOPPED)
         session.release()  # The hold has lapsed meanwhile.
         async with held(session, SPEED_MPS):
             await asyncio.sleep(0.05)
-            for stop_id in (stopped.stop.stop_id, stopped.stop.stop_id + 1):
+            for stop_id in (again.stop.stop_id, again.stop.stop_id + 1):
                 # While the driver holds; and not the stop that there is.
                 with pytest.raises(Refused) as refused:
                     await client.reset_stop(stop_id)
                 assert refused.value.reason == Reason.STOP_NOT_RESET
         session.release()
         await asyncio.sleep(0.1)
-        await client.reset_stop(stopped.stop.stop_id)
+        await client.reset_stop(again.stop.stop_id)
         await in_phase(session, DrivePhase.ARMED)
         assert not robot.base.moves
         # Released meanwhile, so a new hold moves it again.

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from common.broadcast import Broadcast
-from common.errors import DriveUnreachableError
-from gateway.status.teleop import DrivePhase, DriveView, StopLatch
+from common.errors import DriveUnreachableError, PreconditionError
+from gateway.status.teleop import DriveCounters, DrivePhase, DriveView, StopLatch
 from gateway.teleop.stops import COPIES_NS, MOST_COPIES, Copies, Stops
 from tests.support.drive_views import actual
 from tests.support.virtual_time import in_virtual_time
@@ -70,6 +70,7 @@ class Drive:
         self.full = 0
         """So many messages more find the connection full."""
         self._numbers = itertools.count(1)
+        self._taken = 0
 
     def stop(self, by: str, reason: str) -> bool:
         if self.full:
@@ -83,12 +84,23 @@ class Drive:
         self._report(DrivePhase.AVAILABLE, None)
         return True
 
+    def report(self) -> None:
+        """Reports that nothing has changed, as it does all the time."""
+        assert self.view.actual
+        self._report(self.view.phase, self.view.stop)
+
     def _confirm(self, by: str, reason: str) -> None:
+        self._taken += 1
         latch = StopLatch(next(self._numbers), by, reason, time.monotonic_ns())
         self._report(DrivePhase.STOPPED, latch)
 
     def _report(self, phase: DrivePhase, stop: StopLatch | None) -> None:
-        report = actual(phase=phase, stop=stop, monotonic_ns=time.monotonic_ns())
+        report = actual(
+            phase=phase,
+            stop=stop,
+            monotonic_ns=time.monotonic_ns(),
+            counters=DriveCounters(stops=self._taken),
+        )
         self.view = replace(self.view, actual=report)
         self.changes.notify_all()
 
@@ -103,12 +115,32 @@ def stops_of(drive: Drive) -> Stops:
     return Stops(double, double)
 
 
+async def test_each_request_gets_a_stop_of_its_own(drive: Drive) -> None:
+    """Two people with one credential: the reset of the first one's stop must not undo the second one's."""
+    stops = stops_of(drive)
+    first = await stops.stop("anna", "", "one")
+    second = await stops.stop("anna", "", "two")
+    assert (first.stop_id, second.stop_id) == (1, 2)
+    assert await stops.stop("anna", "", "one") == first, "a copy"
+    with pytest.raises(PreconditionError, match="the present stop is 2"):
+        await stops.reset(first.stop_id)
+
+
+async def test_a_report_of_an_earlier_stop_confirms_no_later_one(drive: Drive) -> None:
+    """Reports come all the time while the robot is stopped, also before a further stop has arrived."""
+    stops = stops_of(drive)
+    await stops.stop("anna", "", "one")
+    stopping = asyncio.create_task(stops.stop("anna", "", "two"))
+    asyncio.get_running_loop().call_soon(drive.report)
+    assert (await stopping).stop_id == 2
+
+
 async def test_stops_of_two_callers_in_turns_are_few_for_the_drive_program(drive: Drive) -> None:
     """Each caller's are confirmed once in a while, whoever stops in between."""
     stops = stops_of(drive)
-    for _ in range(200):
+    for number in range(200):
         for by in ("anna", "ben"):
-            assert await stops.stop(by, "")
+            assert await stops.stop(by, "", f"request {number}")
     assert drive.sent[:2] == ["anna", "ben"]
     assert len(drive.sent) < 40
 

@@ -515,7 +515,7 @@ class Stop(_message.Message):
     BY_FIELD_NUMBER: _builtins.int
     REASON_FIELD_NUMBER: _builtins.int
     by: _builtins.str
-    """Who, for people. The same caller stopping again keeps the stop's number."""
+    """Who, for people. Each stop gets a number of its own, also when the same caller has stopped before."""
     reason: _builtins.str
     """Why, for people."""
     def __init__(

@@ -89,8 +89,10 @@ class TeleopServiceServicer:
 
     def StopRobot(self, request, context):
         """Stops the robot until ResetStop, no matter who drives it. Every caller who may see the status may stop; no
-        limit on calls, connections or streams applies. Returns when the robot has confirmed the stop. Repeating a
-        stop keeps its ID, so the call may be sent on several connections at once.
+        limit on calls, connections or streams applies. Returns when the robot has confirmed the stop. Each stop has an
+        ID of its own, so that a reset on its way undoes none that came after it; copies of one request (request_id)
+        have one, so that the call may be sent on several connections at once. Of one caller's stops beyond ten a second
+        each may have the ID of the one before.
 
         FAILED_PRECONDITION: the robot is not set up for driving.
         UNAVAILABLE: the robot's drive program does not confirm it. It stops by itself when it loses the gateway.
