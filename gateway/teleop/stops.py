@@ -19,6 +19,7 @@ HOW_TO_REACH: Final = (
     "start or restart robot-drive on the robot; the gateway connects by itself. Without the gateway's "
     "commands it publishes zeros, or nothing"
 )
+_KEPT: Final = f"It gets the stop first of all when it is connected again: {HOW_TO_REACH}"
 _AT_ONCE: Final = 10.0
 _PER_S: Final = 10.0
 """So many stops of one caller at once, and so many more a second, get a number each. Those beyond get the
@@ -97,7 +98,7 @@ class _Sent:
         return cls(time.monotonic_ns(), actual.instance_id, actual.counters.stops)
 
     def taken(self, view: DriveView) -> bool:
-        """Returns whether the drive program has taken a stop since: no reset on its way has seen its number."""
+        """Returns whether the drive program has taken a stop since; no reset on its way has seen that one."""
         actual = view.actual
         if actual is None or not view.reachable or actual.monotonic_ns < self.at_ns:
             return False
@@ -106,6 +107,9 @@ class _Sent:
 
 class Stops:
     """Stops the robot, for anyone, and resets that.
+
+    A stop that the drive program does not confirm is kept, the newest one alone, and is the first message of
+    the next connection, however late that comes: nobody has called it off. Its caller was told so.
 
     Args:
         link: to the drive program.
@@ -118,7 +122,9 @@ class Stops:
         self._pace = Pace()
         """Of callers while the stop in force holds; anew after a reset."""
         self._sent: dict[str, _Sent] = {}
-        """Each caller's stop that was sent and is not confirmed yet."""
+        """Each caller's stop that was sent and is awaited."""
+        self._kept: _Sent | None = None
+        """The newest stop, until it is confirmed, awaited or not."""
         self._copies = Copies()
 
     async def stop(self, by: str, reason: str, request_id: str = "") -> StopLatch:
@@ -154,7 +160,7 @@ class Stops:
         if sent := self._sent.get(by):
             await self._wait_for_confirmation(sent)
         else:
-            sent = _Sent.now(self._link.view)
+            sent = self._kept = _Sent.now(self._link.view)
             await self._send(by, reason)
             self._sent[by] = sent
             try:
@@ -172,7 +178,9 @@ class Stops:
         deadline_s = loop.time() + CONFIRMED_WITHIN_S
         while not self._commands.stop(by, reason):
             if not self._link.view.reachable or loop.time() > deadline_s:
-                raise DriveUnreachableError(f"the robot's drive program can't be reached: {HOW_TO_REACH}")
+                raise DriveUnreachableError(
+                    f"the robot's drive program can't be reached, and has not confirmed the stop. {_KEPT}"
+                )
             await asyncio.sleep(retry.next_s())
 
     async def _wait_for_confirmation(self, sent: _Sent) -> None:
@@ -181,9 +189,14 @@ class Stops:
             return sent.taken(view) and view.phase is DrivePhase.STOPPED
 
         if not await self._link.changes.wait_until(confirmed, CONFIRMED_WITHIN_S):
-            raise DriveUnreachableError(
-                f"the robot's drive program has not confirmed the stop: {HOW_TO_REACH}"
-            )
+            raise DriveUnreachableError(f"the robot's drive program has not confirmed the stop. {_KEPT}")
+        self.follow()
+
+    def follow(self) -> None:
+        """Keeps the newest stop until the drive program has taken it; to be called on each report."""
+        if self._kept and self._kept.taken(self._link.view):
+            self._kept = None
+            self._commands.stop_confirmed()
 
     def in_force(self, stop: StopLatch) -> bool:
         """Returns whether a stop was not reset, as far as the drive program has reported."""

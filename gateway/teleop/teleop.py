@@ -6,7 +6,7 @@ a driver's last lane ends, or it is silent for 2 s
     The lease ends. Lost while holding: the drive program stops the robot until a reset (its on_loss).
 the drive program is gone, or its connection
     States say DRIVE_LOST. The session stays, and gets the lease again from the next process; its driver has
-    to release and to hold again.
+    to release and to hold again. A stop that is not confirmed is the first message that the next one gets.
 driving is disabled
     The session ends, its lanes with TELEOP_DISABLED.
 the computer was suspended
@@ -238,11 +238,12 @@ class Teleop:
                 self._commands.picture(self._preview().newest_capture_ns(time.monotonic_ns()))
 
     async def follow(self) -> NoReturn:
-        """Grants the lease to each process of the drive program."""
+        """Follows the drive program: a stop that it confirms late, and the lease, granted to each process."""
         seen: DriveView | None = None
         while True:
             await self.link.changes.wait_until(lambda: self.link.view is not seen)  # noqa: B023  # read at once
             seen = self.link.view
+            self.stops.follow()
             self._grant()
 
     def _check_enabled(self) -> None:

@@ -1,5 +1,6 @@
 """What can't wait for the link's reconciliation: leases, commands, stops, the age of the pictures."""
 
+import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Final
@@ -9,6 +10,8 @@ from gateway.links.drive.wire import DriveClient, DriveConnector, command_messag
 from gateway.links.watch import SharingConnector
 from gateway.status.teleop import LeaseEnd
 from omniseer.drive.v1 import drive_pb2 as pb
+
+_log = logging.getLogger(__name__)
 
 ENDS: Final = {
     LeaseEnd.CLOSED: pb.LEASE_END_CLOSED,
@@ -23,7 +26,7 @@ ENDS: Final = {
 class DriveCommands(SharingConnector[DriveClient]):
     """A connector for the link that uses its connection for the driver's messages as well.
 
-    Every method but `connect` returns at once: whether the message is on its way; False without a connection.
+    Every method that sends returns at once: whether the message is on its way; False without a connection.
 
     Args:
         connector: opens the connections.
@@ -35,12 +38,17 @@ class DriveCommands(SharingConnector[DriveClient]):
     def __init__(self, connector: DriveConnector) -> None:
         super().__init__(connector)
         self.connection = 0
+        self._unconfirmed: pb.ToDrive | None = None
+        """The newest stop, until it is confirmed: the first message of each new connection."""
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[DriveClient]:
         """Yields a connection."""
         async with super().connect() as client:
             self.connection += 1
+            if self._unconfirmed:
+                _log.warning("the stop by %s, not confirmed, is sent again", self._unconfirmed.stop.by)
+                client.send(self._unconfirmed)
             yield client
 
     def grant(self, session_id: str, holder: str, *, line_of_sight: bool, streaming: bool) -> bool:
@@ -59,8 +67,13 @@ class DriveCommands(SharingConnector[DriveClient]):
         return self._send(command_message(session_id, command))
 
     def stop(self, by: str, reason: str) -> bool:
-        """Stops the robot."""
-        return self._send(pb.ToDrive(stop=pb.Stop(by=by, reason=reason)))
+        """Stops the robot. Until `stop_confirmed`, each new connection begins with the newest stop."""
+        self._unconfirmed = pb.ToDrive(stop=pb.Stop(by=by, reason=reason))
+        return self._send(self._unconfirmed)
+
+    def stop_confirmed(self) -> None:
+        """Keeps the newest stop no longer; the drive program has it, or a later one."""
+        self._unconfirmed = None
 
     def reset(self, stop_id: int) -> bool:
         """Resets a stop."""

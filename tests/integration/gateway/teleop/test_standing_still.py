@@ -12,7 +12,14 @@ from collections.abc import AsyncIterator, Iterator
 import psutil
 import pytest
 
-from console.client import AsyncGatewayClient, DriveInhibit, DrivePhase, DriveSession
+from console.client import (
+    AsyncGatewayClient,
+    DriveInhibit,
+    DrivePhase,
+    DriveSession,
+    GatewayError,
+    StopLatch,
+)
 from tests.support.driven_robot import BY_EYE, DrivenRobot, available, driven_robot, held, in_motion
 from tests.support.eventually import eventually
 from tests.support.promise import keeps_async
@@ -99,6 +106,27 @@ async def test_a_drive_program_that_is_started_again_gets_the_lease_and_moves_on
     assert session.state is not None
     assert session.state.phase is DrivePhase.ARMED, "the same session has the lease of the new process"
     await in_motion(session, robot.base, SPEED_MPS)
+
+
+async def test_a_stop_while_the_drive_program_is_away_reaches_the_next_one(robot: DrivenRobot) -> None:
+    """Nothing masks autonomy meanwhile; it must not have the robot again afterwards."""
+    async with available(robot) as client:
+
+        async def inhibits() -> tuple[DriveInhibit, ...]:
+            return (await client.status()).teleop.inhibits
+
+        async def stop() -> StopLatch | None:
+            return (await client.status()).teleop.stop
+
+        psutil.Process(robot.drive.process.pid).children()[0].kill()
+        await eventually(inhibits, lambda it: DriveInhibit.DRIVE_LOST in it, "the worker is gone")
+        with pytest.raises(GatewayError, match="not confirmed the stop"):
+            await client.stop_robot("a child")
+        found = await eventually(stop, bool, "the next worker has the stop", STARTS_WITHIN_S)
+        assert found
+        assert found.reason == "a child"
+    async with available(robot):  # Not at once: the drive program does not know yet what else commands.
+        assert not robot.base.moves
 
 
 async def reached(session: DriveSession, inhibit: DriveInhibit) -> bool:

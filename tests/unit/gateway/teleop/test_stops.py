@@ -69,16 +69,37 @@ class Drive:
         self.sent: list[str] = []
         self.full = 0
         """So many messages more find the connection full."""
+        self.hangs = False
+        """Whether it takes stops and does nothing."""
+        self.kept = ""
+        """Whose stop is not confirmed."""
+        self._instance_id = "a process"
         self._numbers = itertools.count(1)
         self._taken = 0
 
     def stop(self, by: str, reason: str) -> bool:
+        self.kept = by
         if self.full:
             self.full -= 1
             return False
         self.sent.append(by)
-        asyncio.get_running_loop().call_soon(self._confirm, by, reason)
+        if not self.hangs:
+            asyncio.get_running_loop().call_soon(self.confirm, by, reason)
         return True
+
+    def stop_confirmed(self) -> None:
+        self.kept = ""
+
+    def go(self) -> None:
+        """Ends, or loses its connection."""
+        self.view = replace(self.view, error="gone")
+        self.full = 10**6
+
+    def come_back(self) -> None:
+        """Connects as another process, which knows nothing of the one before."""
+        self._instance_id, self._taken, self.full = "another process", 0, 0
+        self.view = replace(self.view, error="")
+        self._report(DrivePhase.AVAILABLE, None)
 
     def reset(self, _stop_id: int) -> bool:
         self._report(DrivePhase.AVAILABLE, None)
@@ -89,13 +110,14 @@ class Drive:
         assert self.view.actual
         self._report(self.view.phase, self.view.stop)
 
-    def _confirm(self, by: str, reason: str) -> None:
+    def confirm(self, by: str, reason: str) -> None:
         self._taken += 1
         latch = StopLatch(next(self._numbers), by, reason, time.monotonic_ns())
         self._report(DrivePhase.STOPPED, latch)
 
     def _report(self, phase: DrivePhase, stop: StopLatch | None) -> None:
         report = actual(
+            instance_id=self._instance_id,
             phase=phase,
             stop=stop,
             monotonic_ns=time.monotonic_ns(),
@@ -174,8 +196,43 @@ async def test_but_not_without_end(drive: Drive) -> None:
 
 
 async def test_nor_where_the_drive_program_has_gone(drive: Drive) -> None:
-    drive.full = 10**6
-    drive.view = replace(drive.view, error="gone")
+    drive.go()
     with pytest.raises(DriveUnreachableError, match="can't be reached"):
         await stops_of(drive).stop("anna", "")
     assert drive.full == 10**6 - 1
+
+
+async def test_a_stop_that_finds_no_drive_program_is_kept_until_the_next_has_it(drive: Drive) -> None:
+    """Or autonomy would go on when it is back, although a person has stopped the robot."""
+    stops = stops_of(drive)
+    drive.confirm("ben", "")  # Of the process before, whose count begins anew.
+    drive.go()
+    with pytest.raises(DriveUnreachableError, match="first of all when it is connected again"):
+        await stops.stop("anna", "")
+    stops.follow()
+    assert drive.kept == "anna"
+    drive.come_back()
+    stops.follow()
+    assert drive.kept == "anna", "connected is not confirmed"
+    drive.confirm("anna", "")
+    stops.follow()
+    assert not drive.kept
+
+
+@in_virtual_time
+async def test_a_stop_that_is_confirmed_too_late_is_kept_until_then(drive: Drive) -> None:
+    stops = stops_of(drive)
+    drive.hangs = True
+    with pytest.raises(DriveUnreachableError, match="not confirmed the stop"):
+        await stops.stop("anna", "")
+    drive.report()
+    stops.follow()
+    assert drive.kept == "anna"
+    drive.confirm("anna", "")
+    stops.follow()
+    assert not drive.kept, "or a later process would stop by it"
+
+
+async def test_a_stop_that_is_confirmed_is_not_kept(drive: Drive) -> None:
+    await stops_of(drive).stop("anna", "")
+    assert not drive.kept

@@ -95,7 +95,8 @@ class TeleopServiceServicer:
         each may have the ID of the one before.
 
         FAILED_PRECONDITION: the robot is not set up for driving.
-        UNAVAILABLE: the robot's drive program does not confirm it. It stops by itself when it loses the gateway.
+        UNAVAILABLE: the robot's drive program does not confirm it. It stops by itself when it loses the gateway. The
+        gateway keeps the newest such stop as long as it runs, and sends it before all else when they are connected again.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -64,7 +64,8 @@ class TeleopServiceStub:
     each may have the ID of the one before.
 
     FAILED_PRECONDITION: the robot is not set up for driving.
-    UNAVAILABLE: the robot's drive program does not confirm it. It stops by itself when it loses the gateway.
+    UNAVAILABLE: the robot's drive program does not confirm it. It stops by itself when it loses the gateway. The
+    gateway keeps the newest such stop as long as it runs, and sends it before all else when they are connected again.
     """
     ResetStop: _grpc.UnaryUnaryMultiCallable[_teleop_pb2.ResetStopRequest, _teleop_pb2.ResetStopResponse]
     """Resets one stop. It moves nothing: the driver has to release and to hold again.
@@ -110,7 +111,8 @@ class TeleopServiceAsyncStub(TeleopServiceStub):
     each may have the ID of the one before.
 
     FAILED_PRECONDITION: the robot is not set up for driving.
-    UNAVAILABLE: the robot's drive program does not confirm it. It stops by itself when it loses the gateway.
+    UNAVAILABLE: the robot's drive program does not confirm it. It stops by itself when it loses the gateway. The
+    gateway keeps the newest such stop as long as it runs, and sends it before all else when they are connected again.
     """
     ResetStop: _aio.UnaryUnaryMultiCallable[_teleop_pb2.ResetStopRequest, _teleop_pb2.ResetStopResponse]  # type: ignore[assignment]
     """Resets one stop. It moves nothing: the driver has to release and to hold again.
@@ -165,7 +167,8 @@ class TeleopServiceServicer(metaclass=_abc_1.ABCMeta):
         each may have the ID of the one before.
 
         FAILED_PRECONDITION: the robot is not set up for driving.
-        UNAVAILABLE: the robot's drive program does not confirm it. It stops by itself when it loses the gateway.
+        UNAVAILABLE: the robot's drive program does not confirm it. It stops by itself when it loses the gateway. The
+        gateway keeps the newest such stop as long as it runs, and sends it before all else when they are connected again.
         """
 
     @_abc_1.abstractmethod
