@@ -22,7 +22,8 @@ from tests.support.driven_robot import (
     network_settings,
 )
 from tests.support.free import free_domain, free_tcp_port
-from tests.support.running_drive import Base, RunningDrive
+from tests.support.heard import Base
+from tests.support.running_drive import RunningDrive
 from tests.support.tcp_link import TcpLink
 from tests.support.udp_link import Impairment
 

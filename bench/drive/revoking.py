@@ -17,7 +17,7 @@ from gateway.access.role import Role
 from tests.support.driven_robot import BY_EYE, in_motion
 from tests.support.eventually import eventually
 from tests.support.guarded_program import Guarded, guarded_program
-from tests.support.running_drive import Base
+from tests.support.heard import Base
 
 ROUNDS: Final = FEWEST_ROUNDS
 SPEED_MPS: Final = 0.1

@@ -21,8 +21,9 @@ from drive.config import DriveSettings
 from tests.support.driving import BEHIND_THE_MUX
 from tests.support.eventually import eventually
 from tests.support.gateway_program import GatewayProgram, gateway_program
+from tests.support.heard import Base
 from tests.support.ros import simulated_robot
-from tests.support.running_drive import Base, RunningDrive, listening_base, running_drive
+from tests.support.running_drive import RunningDrive, listening_base, running_drive
 from tests.support.waiting import wait_until
 
 REST_S = 0.3

@@ -1,7 +1,6 @@
 """The real drive program as processes of their own, and a subscriber that notes what it publishes."""
 
 import json
-import math
 import os
 import signal
 import subprocess
@@ -10,7 +9,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,6 +19,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from common.ros_node import message_class
+from tests.support.heard import Base, Heard
 from tests.support.waiting import wait_until
 
 _ROOT: Final = Path(__file__).parents[2]
@@ -76,47 +76,6 @@ def running_drive(directory: Path, **settings: Any) -> Iterator[RunningDrive]:
         with suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
-
-
-@dataclass(frozen=True)
-class Heard:
-    """A velocity that reached the subscriber.
-
-    Attributes:
-        at_s: when, by CLOCK_MONOTONIC.
-        stamp_s: its stamp, by the publisher's calendar clock.
-    """
-
-    at_s: float
-    stamp_s: float
-    vx_mps: float
-    vy_mps: float
-    wz_rad_s: float
-
-    @property
-    def moves(self) -> bool:
-        return (self.vx_mps, self.vy_mps, self.wz_rad_s) != (0.0, 0.0, 0.0)
-
-
-@dataclass
-class Base:
-    """What takes the velocities, as a robot's base would."""
-
-    heard: list[Heard] = field(default_factory=list)
-
-    @property
-    def moves(self) -> bool:
-        """Whether the newest velocity is motion."""
-        return bool(self.heard) and self.heard[-1].moves
-
-    def stopped_after_s(self, since_s: float) -> float:
-        """Returns how long after an instant zero has come that no motion followed.
-
-        0 without motion and without a zero after it; infinite if the motion never ended.
-        """
-        last_s = max((each.at_s for each in self.heard if each.moves and each.at_s >= since_s), default=None)
-        zeros_s = (each.at_s for each in self.heard if not each.moves and each.at_s >= (last_s or since_s))
-        return next(zeros_s, since_s if last_s is None else math.inf) - since_s
 
 
 @contextmanager

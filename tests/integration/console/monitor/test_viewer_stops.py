@@ -17,8 +17,8 @@ from gateway.access.credential_admin import CredentialRequest
 from gateway.access.role import Role
 from tests.support.driven_robot import BY_EYE, driven_base, held, in_motion
 from tests.support.guarded_program import guarded_program
+from tests.support.heard import Base
 from tests.support.qt import press, until
-from tests.support.running_drive import Base
 
 pytestmark = pytest.mark.ros
 

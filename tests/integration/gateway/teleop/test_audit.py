@@ -18,7 +18,8 @@ from gateway.access.role import Role
 from tests.support.driven_robot import BY_EYE, in_motion
 from tests.support.eventually import eventually
 from tests.support.guarded_program import Guarded, guarded_program
-from tests.support.running_drive import Base, listening_base, running_drive
+from tests.support.heard import Base
+from tests.support.running_drive import listening_base, running_drive
 
 # Timed: on a machine that is busy with other tests, a late command would end the motion.
 pytestmark = [pytest.mark.ros, pytest.mark.timed]

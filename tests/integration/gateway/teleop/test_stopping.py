@@ -28,9 +28,9 @@ from tests.support.driven_robot import (
 )
 from tests.support.eventually import eventually
 from tests.support.guarded_program import Guarded, guarded_program
+from tests.support.heard import Base
 from tests.support.module_program import module_program
 from tests.support.promise import keeps_async
-from tests.support.running_drive import Base
 
 pytestmark = [pytest.mark.ros, pytest.mark.timed, pytest.mark.alone]
 ROOT = Path(__file__).parents[4]
