@@ -9,6 +9,7 @@ import time
 from collections.abc import AsyncIterator, Iterator
 from contextlib import ExitStack, asynccontextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import pytest
 
@@ -78,11 +79,15 @@ async def seen(
             yield client_and_viewer
 
 
-async def held(session: DriveSession, for_s: float) -> set[DriveInhibit]:
-    """Holds for a time; returns all reasons meanwhile."""
+async def held(
+    session: DriveSession, for_s: float, speed_mps: float = SPEED_MPS, beside: asyncio.Task[Any] | None = None
+) -> set[DriveInhibit]:
+    """Holds for a time, and before that until a task is done; returns all reasons meanwhile."""
     reasons, until_s = set[DriveInhibit](), time.monotonic() + for_s
     while time.monotonic() < until_s:
-        session.hold(SPEED_MPS)
+        if beside and not beside.done():
+            until_s = time.monotonic() + for_s
+        session.hold(speed_mps)
         assert session.state
         reasons |= {*session.state.inhibits}
         await asyncio.sleep(TICK_S)
@@ -105,14 +110,18 @@ async def test_a_picture_without_a_successor_stops_the_robot_in_time(scene: Scen
     async def zero_after_ms() -> float:
         async with seen(scene) as (client, viewer), client.drive(by_picture(viewer)) as session:
             await in_motion(session, scene.robot.base, SPEED_MPS)
+            stopping: asyncio.Task[Any] | None = None
             match fault:
                 case "camera silent":
                     scene.camera.stall()
                 case "preview stopped":
-                    await asyncio.gather(client.disable_preview(), held(session, TICK_S))
+                    # Held meanwhile, however long it takes: a hold that lapses would stop the robot instead.
+                    stopping = asyncio.create_task(client.disable_preview())
                 case _:
                     viewer.frozen = True
-            reasons = await held(session, LONGER_S)
+            reasons = await held(session, LONGER_S, beside=stopping)
+            if stopping:
+                await stopping
             assert reasons & {DriveInhibit.PICTURE_MISSING, DriveInhibit.PICTURE_STALE}
             await eventually(lambda: is_at_rest(scene.robot.base), bool, "the last message is zero")
             return scene.robot.base.stopped_after_s(viewer.shown_ns / 1e9) * 1000
