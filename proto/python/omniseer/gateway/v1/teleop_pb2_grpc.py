@@ -105,8 +105,9 @@ class TeleopServiceServicer:
     def ResetStop(self, request, context):
         """Resets one stop. It moves nothing: the driver has to release and to hold again.
 
-        FAILED_PRECONDITION: the robot is not set up for driving, that stop is not the present one, or the driver
-        holds.
+        FAILED_PRECONDITION: the robot is not set up for driving, that stop is not the present one, the driver holds, or
+        another source moves the robot; or, unless a driver is heard who keeps it away, another source commands motion,
+        or may do so unseen: within 3 s after the drive program was started or another source has moved the robot.
         UNAVAILABLE: the robot's drive program does not answer.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)

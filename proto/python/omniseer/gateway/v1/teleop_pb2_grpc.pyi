@@ -70,8 +70,9 @@ class TeleopServiceStub:
     ResetStop: _grpc.UnaryUnaryMultiCallable[_teleop_pb2.ResetStopRequest, _teleop_pb2.ResetStopResponse]
     """Resets one stop. It moves nothing: the driver has to release and to hold again.
 
-    FAILED_PRECONDITION: the robot is not set up for driving, that stop is not the present one, or the driver
-    holds.
+    FAILED_PRECONDITION: the robot is not set up for driving, that stop is not the present one, the driver holds, or
+    another source moves the robot; or, unless a driver is heard who keeps it away, another source commands motion,
+    or may do so unseen: within 3 s after the drive program was started or another source has moved the robot.
     UNAVAILABLE: the robot's drive program does not answer.
     """
 
@@ -117,8 +118,9 @@ class TeleopServiceAsyncStub(TeleopServiceStub):
     ResetStop: _aio.UnaryUnaryMultiCallable[_teleop_pb2.ResetStopRequest, _teleop_pb2.ResetStopResponse]  # type: ignore[assignment]
     """Resets one stop. It moves nothing: the driver has to release and to hold again.
 
-    FAILED_PRECONDITION: the robot is not set up for driving, that stop is not the present one, or the driver
-    holds.
+    FAILED_PRECONDITION: the robot is not set up for driving, that stop is not the present one, the driver holds, or
+    another source moves the robot; or, unless a driver is heard who keeps it away, another source commands motion,
+    or may do so unseen: within 3 s after the drive program was started or another source has moved the robot.
     UNAVAILABLE: the robot's drive program does not answer.
     """
 
@@ -179,8 +181,9 @@ class TeleopServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_teleop_pb2.ResetStopResponse, _abc.Awaitable[_teleop_pb2.ResetStopResponse]]:
         """Resets one stop. It moves nothing: the driver has to release and to hold again.
 
-        FAILED_PRECONDITION: the robot is not set up for driving, that stop is not the present one, or the driver
-        holds.
+        FAILED_PRECONDITION: the robot is not set up for driving, that stop is not the present one, the driver holds, or
+        another source moves the robot; or, unless a driver is heard who keeps it away, another source commands motion,
+        or may do so unseen: within 3 s after the drive program was started or another source has moved the robot.
         UNAVAILABLE: the robot's drive program does not answer.
         """
 
