@@ -47,6 +47,9 @@ class TestSource(AnySource):
     """Pattern of GStreamer's videotestsrc: different ones tell cameras apart."""
 
 
+CameraFormat = Literal["auto", "raw", "jpeg"]
+
+
 class V4l2Source(AnySource):
     """V4L2 camera, by device node or by card name; node numbers are not stable across boots."""
 
@@ -54,7 +57,9 @@ class V4l2Source(AnySource):
     device: str = ""
     card: str = ""
     fps: int | None = Field(default=None, gt=0, le=MAX_FPS)
-    """Capture rate. None: that of the fastest profile."""
+    """Highest capture rate. None: that of the fastest profile."""
+    format: CameraFormat = "auto"
+    """What it sends: uncompressed frames, JPEG pictures, or whichever comes nearer to rate and size."""
 
     @model_validator(mode="after")
     def _device_xor_card(self) -> "V4l2Source":

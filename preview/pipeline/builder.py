@@ -20,7 +20,7 @@ from typing import Any, Final
 from common.errors import UserError
 from common.gst import GLib, Gst
 from preview.encoders import properties
-from preview.pipeline import capture_clock, tap_source
+from preview.pipeline import camera_decoder, capture_clock, tap_source
 from preview.pipeline.plan import Plan
 
 _TABLES_EVERY: Final = 4500
@@ -33,6 +33,7 @@ SOURCE_END: Final = "source_end"
 _SOURCE_CAPS: Final = "source_caps"
 _TRANSPARENT: Final = frozenset({"queue", "queue2", "identity"})
 
+camera_decoder.register()
 tap_source.register()
 
 
@@ -128,9 +129,6 @@ def build_source(plan: Plan) -> Any:
         UserError: an element is missing, or the source's description is invalid.
     """
     description = plan.source.description
-    if plan.source.capture_fps:
-        # Negotiates the camera's highest rate up to this; one that has none posts an error itself.
-        description += f" ! video/x-raw,framerate=[ 1/1, {plan.source.capture_fps}/1 ]"
     if plan.source.any_rate:
         description += f" ! capsfilter name={_SOURCE_CAPS}"
     # It is also needed by descriptions that end in caps, which must be followed by an element.

@@ -13,6 +13,7 @@ from common.errors import UserError
 from common.start_command import start_command
 from preview.config import (
     AnyKind,
+    CameraFormat,
     FileSource,
     GstSource,
     PreviewSettings,
@@ -21,12 +22,17 @@ from preview.config import (
     V4l2Source,
 )
 from preview.pipeline import tap_client
+from preview.values import Target
 
 TAP_SOURCE = "cameratapsrc"
 """Element of preview/pipeline/tap_source.py."""
+CAMERA_DECODER = "cameradecoder"
+"""Element of preview/pipeline/camera_decoder.py."""
 CLASS_DIR = Path("/sys/class/video4linux")
 
 _REMEDY_CAMERA = "Check that the camera is connected and that this user may read it (group video)"
+_REMEDY_FORMAT = "; 'format: auto' takes whatever it offers"
+_MEDIA_TYPES = {"auto": ("video/x-raw", "image/jpeg"), "raw": ("video/x-raw",), "jpeg": ("image/jpeg",)}
 _REMEDY_FILE = "Name a video file that this user may read, under {key}.path"
 _REMEDY_TAP = "Start it: {command}. With containers: docker compose --profile tap up -d"
 _REMEDY_TOPIC = "'robot-tap doctor' lists the image topics and says what is wrong with them"
@@ -44,7 +50,6 @@ class SourcePlan:
         remedy: what to do when it fails.
         properties: element name in the description -> property -> value, set after parsing.
         any_rate: generates any size and frame rate; other sources are converted.
-        capture_fps: frame rate to negotiate with the source. None: its own.
         loops: restarts at its end.
     """
 
@@ -54,7 +59,6 @@ class SourcePlan:
     remedy: str
     properties: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     any_rate: bool = False
-    capture_fps: int | None = None
     loops: bool = False
 
 
@@ -85,7 +89,8 @@ def _plan(settings: PreviewSettings, camera: str, key: str, source: AnyKind) -> 
             description = f"videotestsrc is-live=true horizontal-speed=4 pattern={pattern}"
             return SourcePlan(camera, "test pattern", description, "", any_rate=True)
         case V4l2Source():
-            return _camera(camera, source, fastest_fps)
+            formats = _formats(source.format, settings.profiles.largest, source.fps or fastest_fps)
+            return _camera(camera, source, formats)
         case FileSource(path=path):
             return _file(camera, path, _REMEDY_FILE.format(key=key))
         case RosSource(topic=topic, fps=fps):
@@ -94,7 +99,7 @@ def _plan(settings: PreviewSettings, camera: str, key: str, source: AnyKind) -> 
             return SourcePlan(camera, f"{key}.description", description, _REMEDY_GST.format(key=key))
 
 
-def _camera(camera: str, source: V4l2Source, fastest_fps: int) -> SourcePlan:
+def _camera(camera: str, source: V4l2Source, formats: str) -> SourcePlan:
     device = source.device or find_card(source.card)
     try:
         mode = Path(device).stat().st_mode
@@ -105,11 +110,24 @@ def _camera(camera: str, source: V4l2Source, fastest_fps: int) -> SourcePlan:
     return SourcePlan(
         camera,
         f"camera {device}",
-        "v4l2src name=camera do-timestamp=true",
-        _REMEDY_CAMERA,
+        f'v4l2src name=camera do-timestamp=true ! capsfilter caps="{formats}" ! {CAMERA_DECODER}',
+        _REMEDY_CAMERA + ("" if source.format == "auto" else _REMEDY_FORMAT),
         properties={"camera": {"device": device}},
-        capture_fps=source.fps or fastest_fps,
     )
+
+
+def _formats(form: CameraFormat, largest: Target, fps: int) -> str:
+    """Returns the caps that a camera is asked for.
+
+    Of what both sides can do, v4l2src takes what is nearest to the largest values of the first structure: the
+    rate counts more than the size, and both more than the format (gst_v4l2src_negotiate). So a camera that
+    sends uncompressed frames of this size slowly is asked for JPEG, and no larger frames than needed are
+    decoded. One that has only larger frames gives those. One that has no such rate posts an error.
+    """
+    rate = f"framerate=[1/1,{fps}/1]"
+    size = f"width=[1,{largest.width_px}],height=[1,{largest.height_px}]"
+    medias = _MEDIA_TYPES[form]
+    return "; ".join([f"{media},{size},{rate}" for media in medias] + [f"{media},{rate}" for media in medias])
 
 
 def find_card(card: str, class_dir: Path = CLASS_DIR) -> str:

@@ -38,6 +38,7 @@ class RunningPreview:
         directory: for its configuration, socket and log.
         settings: keys of the configuration that differ from the test's own: test pattern, x264, small frames.
         doubles: hardware encoders to pretend, element -> how it fails (see encoder_doubles).
+        cameras: devices to pretend, device -> its formats and how it fails (see camera_doubles).
         small: whether frames are smaller than those of the service's own profiles.
     """
 
@@ -47,6 +48,7 @@ class RunningPreview:
         settings: Mapping[str, Any] | None = None,
         doubles: Mapping[str, str] | None = None,
         *,
+        cameras: Mapping[str, Any] | None = None,
         small: bool = True,
     ) -> None:
         self.port = free_udp_port()
@@ -55,6 +57,7 @@ class RunningPreview:
         self.log = directory / "preview.log"
         self._config = directory / "preview.yaml"
         self._doubles = dict(doubles or {})
+        self._cameras = dict(cameras or {})
         self.revision = 0
         own: dict[str, Any] = {
             "socket": str(self.socket),
@@ -184,9 +187,10 @@ class RunningPreview:
 
     def _spawn(self) -> subprocess.Popen[bytes]:
         environment = dict(os.environ)
-        if self._doubles:
+        if self._doubles or self._cameras:
             environment["PYTHONPATH"] = f"{DOUBLES_DIR}:{ROOT}"
             environment["ENCODER_DOUBLES"] = json.dumps(self._doubles)
+            environment["CAMERA_DOUBLES"] = json.dumps(self._cameras)
         with self.log.open("ab") as log:
             return subprocess.Popen(
                 [sys.executable, "-m", "preview.cli", "serve", "--config", str(self._config)],

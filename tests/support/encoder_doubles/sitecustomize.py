@@ -3,6 +3,8 @@
 So neither the service nor its trials know anything of doubles, and both meet the same ones.
 """
 
-from tests.support.encoder_doubles.doubles import register_from_environment
+from tests.support import camera_doubles
+from tests.support.encoder_doubles import doubles
 
-register_from_environment()
+doubles.register_from_environment()
+camera_doubles.register_from_environment()

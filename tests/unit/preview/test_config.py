@@ -122,6 +122,7 @@ def test_cameras_have_names_and_an_order(tmp_path: Path, monkeypatch: pytest.Mon
         ("cameras: {front: {kind: test, fallback: front}}", r"\(there are: none\), not 'front'"),
         ("cameras: {Front door: {kind: test}}", "Front door"),
         ("cameras: {front: {kind: v4l2, device: a, card: b}}", "name either the device"),
+        ("source: {kind: v4l2, device: a, format: mjpg}", "one of auto, raw, jpeg"),
         (f"cameras: {{{', '.join(f'c{i}: {{kind: test}}' for i in range(17))}}}", "16"),
     ],
 )

@@ -1,7 +1,9 @@
 """Sources as plans: what is checked before GStreamer is asked."""
 
+import re
 import socket
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -56,10 +58,44 @@ def test_the_test_pattern_makes_any_rate_and_the_others_do_not(tmp_path: Path) -
     assert (described.any_rate, described.loops, described.description) == (False, False, "videotestsrc")
 
 
-def test_a_camera_is_asked_for_the_fastest_profile_or_what_is_configured() -> None:
+def asked_for(**settings: Any) -> list[str]:
+    """The caps that a camera is asked for, the preferred ones first."""
     # Any character device will do for a plan.
-    assert planned(V4l2Source(device="/dev/null")).capture_fps == 60
-    assert planned(V4l2Source(device="/dev/null", fps=25)).capture_fps == 25
+    plan = planned(V4l2Source(device="/dev/null", **settings))
+    found = re.fullmatch(
+        r'v4l2src name=camera do-timestamp=true ! capsfilter caps="(.+)" ! cameradecoder', plan.description
+    )
+    assert found
+    return found[1].split("; ")
+
+
+def test_a_camera_is_asked_for_the_fastest_profile_or_what_is_configured() -> None:
+    assert all("framerate=[1/1,60/1]" in caps for caps in asked_for())
+    assert all("framerate=[1/1,25/1]" in caps for caps in asked_for(fps=25))
+
+
+def test_a_camera_is_asked_for_frames_of_the_largest_profile_before_larger_ones() -> None:
+    assert asked_for(format="raw") == [
+        "video/x-raw,width=[1,1280],height=[1,720],framerate=[1/1,60/1]",
+        "video/x-raw,framerate=[1/1,60/1]",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("form", "media"),
+    [
+        ("auto", ["video/x-raw", "image/jpeg"]),
+        ("raw", ["video/x-raw"]),
+        ("jpeg", ["image/jpeg"]),
+    ],
+)
+def test_a_camera_is_asked_for_the_configured_formats(form: str, media: list[str]) -> None:
+    assert [caps.partition(",")[0] for caps in asked_for(format=form)] == 2 * media
+
+
+def test_only_a_camera_that_is_bound_to_a_format_is_explained_that_it_need_not_be() -> None:
+    assert "format: auto" not in planned(V4l2Source(device="/dev/null")).remedy
+    assert "format: auto" in planned(V4l2Source(device="/dev/null", format="raw")).remedy
 
 
 @pytest.mark.parametrize("content", [None, b""])
