@@ -306,6 +306,23 @@ class PreviewSettings(Settings):
                 )
         return cameras
 
+    @field_validator("cameras")
+    @classmethod
+    def _a_device_each(cls, cameras: dict[str, Source]) -> dict[str, Source]:
+        """Refuses two cameras at one device: a device can be opened once."""
+        taken: dict[tuple[str, str], str] = {}
+        for name, source in cameras.items():
+            if not isinstance(source, V4l2Source):
+                continue
+            key = ("card", source.card) if source.card else ("device", source.device)
+            if key in taken:
+                raise ValueError(
+                    f"{taken[key]} and {name} name the same {' '.join(key)}, which is one device;"
+                    " 'ls -l /dev/v4l/by-path' lists a name for each camera, to be used as device"
+                )
+            taken[key] = name
+        return cameras
+
     @model_validator(mode="after")
     def _no_fallback_of_one(self) -> "PreviewSettings":
         if not self.cameras and self.source.fallback is not None:

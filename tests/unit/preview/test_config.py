@@ -114,6 +114,17 @@ def test_cameras_have_names_and_an_order(tmp_path: Path, monkeypatch: pytest.Mon
     assert rear == V4l2Source(device="/dev/video5")
 
 
+def test_two_cameras_may_have_cards_or_devices_of_their_own(tmp_path: Path) -> None:
+    text = """
+cameras:
+  front: {kind: v4l2, device: "/dev/v4l/by-path/pci-0000:00:14.0-usb-0:1:1.0-video-index0"}
+  rear: {kind: v4l2, device: "/dev/v4l/by-path/pci-0000:00:14.0-usb-0:2:1.0-video-index0", format: jpeg}
+  arm: {kind: v4l2, card: "USB Camera"}
+  mast: {kind: v4l2, card: rkisp_mainpath}
+"""
+    assert list(from_text(tmp_path, text).named_sources) == ["front", "rear", "arm", "mast"]
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -122,6 +133,14 @@ def test_cameras_have_names_and_an_order(tmp_path: Path, monkeypatch: pytest.Mon
         ("cameras: {front: {kind: test, fallback: front}}", r"\(there are: none\), not 'front'"),
         ("cameras: {Front door: {kind: test}}", "Front door"),
         ("cameras: {front: {kind: v4l2, device: a, card: b}}", "name either the device"),
+        (
+            "cameras: {front: {kind: v4l2, card: USB}, rear: {kind: v4l2, card: USB}}",
+            "front and rear name the same card USB, which is one device; .* /dev/v4l/by-path",
+        ),
+        (
+            "cameras: {front: {kind: v4l2, device: /dev/video0}, rear: {kind: v4l2, device: /dev/video0}}",
+            "front and rear name the same device /dev/video0",
+        ),
         ("source: {kind: v4l2, device: a, format: mjpg}", "one of auto, raw, jpeg"),
         (f"cameras: {{{', '.join(f'c{i}: {{kind: test}}' for i in range(17))}}}", "16"),
     ],
