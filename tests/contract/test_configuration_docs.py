@@ -1,16 +1,19 @@
-"""docs/configuration.md names every key there is, and none that is not."""
+"""docs/configuration.md names every key there is, and no other; its examples of cameras are accepted."""
 
 import re
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, get_args
 
 import pytest
 from pydantic import BaseModel
+from typer.testing import CliRunner
 
 from bridge.config import BridgeSettings
 from drive.config import DriveSettings
 from gateway.config import GatewaySettings
+from preview.cli import app as preview_app
 from preview.config import PreviewSettings
 from recorder.config import RecorderSettings
 from tap.config import TapSettings
@@ -54,3 +57,29 @@ def test_the_page_lists_exactly_the_keys(settings: type[BaseModel], heading: str
     keys = {PROFILE.sub("profiles.NAME.", key) for key in keys_of(settings)}
     # Each of the preview's cameras has the keys of its source.
     assert documented == {key.replace("cameras.", "source.") for key in keys}
+
+
+def examples_of_cameras() -> list[str]:
+    """The page's examples of cameras, as files."""
+    blocks = re.findall(r"^ *```yaml\n(.*?)^ *```", PAGE, re.MULTILINE | re.DOTALL)
+    found = [
+        block for each in blocks if re.search(r"^cameras:", block := textwrap.dedent(each), re.MULTILINE)
+    ]
+    assert len(found) == len(re.findall(r"^ *cameras:$", PAGE, re.MULTILINE)), "each is in a block"
+    assert len(found) >= 2
+    return found
+
+
+@pytest.mark.parametrize("example", examples_of_cameras())
+def test_the_examples_of_cameras_are_accepted_and_printed_as_they_are(example: str, tmp_path: Path) -> None:
+    file, printed = tmp_path / "preview.yaml", tmp_path / "printed.yaml"
+    file.write_text(example, encoding="utf-8")
+    checked = CliRunner().invoke(preview_app, ["check", "--config", str(file)])
+    assert (checked.exit_code, checked.output) == (0, f"{file}: ok\n"), checked.exception
+
+    def print_of(path: Path) -> str:
+        return CliRunner().invoke(preview_app, ["check", "--config", str(path), "--print"]).output
+
+    printed.write_text(print_of(file), encoding="utf-8")
+    assert "cameras:" in printed.read_text(encoding="utf-8")
+    assert print_of(printed) == printed.read_text(encoding="utf-8")

@@ -1,10 +1,14 @@
 """What each overlay adds up to, as compose itself resolves it. Needs compose, no engine's work."""
 
 import json
+import re
 import subprocess
+import textwrap
+from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from common import ros_transport
 from tests.support.engine import ROOT
@@ -14,8 +18,13 @@ pytestmark = pytest.mark.docker
 OVERLAYS = ("", "rockchip", "v4l2", "vaapi", "demo", "guarded", "realtime")
 
 
-def config(*overlays: str, profile: str = "") -> dict[str, Any]:
-    files = ["compose.yaml", *(f"compose.{name}.yaml" for name in overlays if name)]
+def config(*overlays: str, profile: str = "", own: Path | None = None) -> dict[str, Any]:
+    """What compose makes of the base with overlays, and with a file of the robot's own."""
+    files = [
+        "compose.yaml",
+        *(f"compose.{name}.yaml" for name in overlays if name),
+        *([str(own)] if own else []),
+    ]
     words = [word for name in files for word in ("-f", name)]
     done = subprocess.run(
         ["docker", "compose", *words, "--profile", profile, "config", "--format", "json"],
@@ -144,7 +153,7 @@ def test_what_speaks_ros_is_where_the_robots_nodes_are(program: str, profile: st
 
 @pytest.mark.parametrize("program", ["gateway", "drive", "recorder"])
 def test_the_demo_carries_ros_as_a_robot_does(program: str) -> None:
-    services = config("demo", profile={"drive": "drive", "recorder": "record"}.get(program, ""))["services"]
+    services = config("demo", profile="*")["services"]
     assert services[program]["environment"][ros_transport.VARIABLE] == "udp"
 
 
@@ -185,10 +194,61 @@ def test_the_preview_knows_where_its_port_is_published(
 )
 def test_devices_are_named_one_by_one(overlay: str, devices: list[str], groups: list[str]) -> None:
     preview = config(overlay)["services"]["preview"]
-    assert [
-        device.split(":")[0] if isinstance(device, str) else device["source"] for device in preview["devices"]
-    ] == devices
+    assert passed_in(preview) == {device: device for device in devices}
     assert preview["group_add"] == groups
+
+
+def passed_in(service: dict[str, Any]) -> dict[str, str]:
+    """The devices of a service: their names outside, and inside."""
+    return {device["source"]: device["target"] for device in service["devices"]}
+
+
+BY_PATH = "/dev/v4l/by-path/pci-0000:00:14.0-usb-0:1:1.0-video-index0"
+
+
+@pytest.mark.parametrize("camera", ["/dev/video2", BY_PATH])
+@pytest.mark.parametrize("overlay", ["v4l2", "rockchip"])
+def test_a_camera_has_its_own_name_in_the_container(
+    overlay: str, camera: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By another name the node of a card would not be found."""
+    monkeypatch.setenv("CAMERA", camera)
+    preview = config(overlay)["services"]["preview"]
+    assert passed_in(preview)[camera] == camera
+    assert preview["environment"]["PREVIEW__SOURCE__DEVICE"] == camera
+
+
+def documented(key: str, section: str) -> str:
+    """The block of docs/configuration.md, in a section, that begins with a key."""
+    page = (ROOT / "docs/configuration.md").read_text(encoding="utf-8")
+    text = page.partition(f"\n### {section}\n")[2].partition("\n## ")[0]
+    blocks = re.findall(r"^ *```yaml\n(.*?)^ *```", text, re.MULTILINE | re.DOTALL)
+    (found,) = [block for each in blocks if (block := textwrap.dedent(each)).startswith(f"{key}:\n")]
+    return found
+
+
+@pytest.mark.parametrize(
+    "overlays", [(), ("vaapi",), ("rockchip",)], ids=lambda names: "+".join(names) or "none"
+)
+def test_the_documented_overlay_passes_in_the_documented_cameras(
+    overlays: tuple[str, ...], tmp_path: Path
+) -> None:
+    section = "Two USB cameras and a ROS topic"
+    cameras = yaml.safe_load(documented("cameras", section))["cameras"].values()
+    wanted = [camera["device"] for camera in cameras if camera["kind"] == "v4l2"]
+    assert len(wanted) == 2
+    overlay = yaml.safe_load(documented("services", section))
+    if "rockchip" in overlays:
+        # As the page says.
+        del overlay["services"]["preview"]["group_add"]
+    own = tmp_path / "compose.cameras.yaml"
+    own.write_text(yaml.safe_dump(overlay), encoding="utf-8")
+    before = config(*overlays)["services"]["preview"]
+    preview = config(*overlays, own=own)["services"]["preview"]
+    others = passed_in(before) if overlays else {}
+    assert passed_in(preview) == others | {device: device for device in wanted}
+    assert "44" in preview["group_add"]
+    assert preview["read_only"]
 
 
 def test_overlays_of_camera_and_encoder_add_up() -> None:
