@@ -22,7 +22,7 @@ from tests.support.markup import MARKUP, mark_up, no_widget_takes_markup, shown_
 from tests.support.promise import keeps
 from tests.support.qt import KEPT_IN, application, let_pass, pixel_rows, press, until
 from tests.support.running_preview import RunningPreview
-from tests.support.video_ground import VideoGround
+from tests.support.video_ground import VideoGround, video_ground
 from tests.support.waiting import wait_until
 
 from PySide6.QtCore import Qt  # isort: skip - after Qt's platform was chosen
@@ -115,6 +115,29 @@ def test_a_person_switches_the_preview_with_a_key(ground: VideoGround, view: Vie
     assert view.windowTitle().endswith(ground.target)
     press(view, Qt.Key.Key_P)
     shows(view, PlaybackState.OFF)
+
+
+def hue_on_screen(view: ViewWindow) -> str:
+    """What a plain picture is: red or blue."""
+    video = on_screen(view.video)
+    colour = video.pixelColor(video.width() // 2, video.height() // 2)
+    return "red" if colour.red() > colour.blue() else "blue" if colour.blue() > colour.red() else "none"
+
+
+def test_a_person_changes_the_camera_with_a_key(tmp_path: Path) -> None:
+    cameras = {name: {"kind": "test", "pattern": name} for name in ("red", "blue")}
+    with (
+        video_ground(tmp_path, {"cameras": cameras}) as ground,
+        viewing(ground.target, None, FrameCounter()) as view,
+    ):
+        ground.switch_on()
+        shows(view, PlaybackState.LIVE)
+        until(lambda: hue_on_screen(view) == "red", "the first camera")
+        press(view, Qt.Key.Key_V)
+        until(lambda: hue_on_screen(view) == "blue", "the next camera")
+        let_pass(0.3)
+        keep(view, "next camera")
+        assert view.robot.session.redials == 0, "over the same connection"
 
 
 def test_a_person_turns_full_screen_on_and_off_and_quits(view: ViewWindow) -> None:
