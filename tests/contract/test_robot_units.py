@@ -25,6 +25,21 @@ OWN_SECTION = {
 """Beyond the hardening of all: priorities, and recordings that a group may read."""
 
 
+DEVICES = {
+    "preview": [
+        "char-video4linux rw",
+        "char-media rw",
+        "char-drm rw",
+        "char-dma_heap rw",
+        "/dev/mpp_service rw",
+        "/dev/rga rw",
+    ]
+}
+"""The devices of each program, beyond null, zero, random and their like; no other program has any."""
+CLASSES = {"/dev/video": "char-video4linux", "/dev/dri": "char-drm", "/dev/dma_heap": "char-dma_heap"}
+"""Devices of the compose overlays, by the beginning of their names, as systemd names them."""
+
+
 def text_of(program: str) -> str:
     return (DEPLOY / f"systemd/robot-{program}.service").read_text(encoding="utf-8")
 
@@ -113,6 +128,33 @@ def test_where_it_may_write_is_made_by_systemd(program: str) -> None:
     for paths in settings(program).get("ReadWritePaths", []):
         for path in paths.split():
             assert re.search(rf"^d {path} [02]750 robot-{program} ", made, re.MULTILINE)
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_it_may_open_these_devices_and_no_others(program: str) -> None:
+    found = settings(program)
+    assert found["DevicePolicy"] == ["closed"]
+    assert found.get("DeviceAllow", []) == DEVICES.get(program, [])
+    assert found.get("PrivateDevices", []) == ([] if program in DEVICES else ["yes"])
+
+
+def overlay_devices() -> set[str]:
+    """The preview's devices in all compose overlays, as systemd names them."""
+    found = set()
+    for file in ROOT.glob("compose.*.yaml"):
+        # Its tags are compose's own.
+        text = file.read_text(encoding="utf-8").replace("!reset", "").replace("!override", "")
+        for device in yaml.safe_load(text)["services"].get("preview", {}).get("devices", []):
+            path = default_of(device["source"] if isinstance(device, dict) else device)
+            named = [name for beginning, name in CLASSES.items() if path.startswith(beginning)]
+            found.add(named[0] if named else path)
+    return found
+
+
+def test_the_previews_devices_are_those_of_the_containers() -> None:
+    """And those of media controllers, which cameras on a board's own interface are set up by."""
+    allowed = {each.removesuffix(" rw") for each in settings("preview")["DeviceAllow"]}
+    assert allowed == overlay_devices() | {"char-media"}
 
 
 def compose(program: str) -> dict[str, object]:
