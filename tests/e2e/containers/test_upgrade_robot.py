@@ -99,11 +99,27 @@ class Robot:
         (target / f"scripts/of-{version}").write_text("")
         (target / ".dockerignore").write_text(version)
 
-    def release(self, version: str, *, healthy: bool = True, revision: str = "") -> Path:
+    def foreign_image(self, tag: str, platform: str) -> None:
+        """An image for another processor, in which no program has to run to make it."""
+        context = self.releases / "context"
+        context.mkdir()
+        (context / "name").write_text(tag)
+        dockerfile = f"FROM scratch\nCOPY name /\nLABEL org.opencontainers.image.revision={tag}\n"
+        options = ["--platform", platform, "--tag", f"robot-gateway:{tag}", "--file", "-"]
+        subprocess.run(
+            ["docker", "build", "--quiet", "--network=none", *options, context],
+            input=dockerfile, capture_output=True, text=True, timeout=120, check=True,
+        )  # fmt: skip
+        self.tags.add(tag)
+
+    def release(self, version: str, *, healthy: bool = True, revision: str = "", platform: str = "") -> Path:
         """A release as scripts/release makes it, with these images."""
         made = self.releases / version
         (made / "images").mkdir(parents=True)
-        self.image(version, version, healthy=healthy, revision=revision)
+        if platform:
+            self.foreign_image(version, platform)
+        else:
+            self.image(version, version, healthy=healthy, revision=revision)
         saved = subprocess.run(
             ["docker", "save", f"robot-gateway:{version}"], capture_output=True, timeout=120, check=True
         ).stdout
@@ -275,6 +291,24 @@ def test_images_of_another_commit_are_refused(robot: Robot) -> None:
     refused = robot.upgrade(robot.release("9.1.0", revision="other"))
     assert refused.returncode == 1
     assert "is of commit other, the release of 9.1.0; nothing was changed" in refused.stderr
+    assert robot.running() == "1.0.0"
+
+
+def test_images_of_another_processor_are_refused(robot: Robot) -> None:
+    """Docker would start them, and each program would end with "exec format error"."""
+    robot.begin()
+    own = subprocess.run(
+        ["docker", "version", "--format", "{{.Server.Os}}/{{.Server.Arch}}"],
+        capture_output=True, text=True, timeout=30, check=True,
+    ).stdout.strip()  # fmt: skip
+    other = "linux/amd64" if own == "linux/arm64" else "linux/arm64"
+    before = robot.snapshot()
+    refused = robot.upgrade(robot.release("9.1.0", platform=other))
+    assert refused.returncode == 1
+    assert (
+        f"robot-gateway:9.1.0 is for {other}, and this robot is {own}; nothing was changed" in refused.stderr
+    )
+    assert robot.snapshot() == before
     assert robot.running() == "1.0.0"
 
 
