@@ -38,7 +38,7 @@ def _shared_demo(
             deployed(
                 directory,
                 demo_overlay(),
-                COMPOSE_PROFILES="record",
+                COMPOSE_PROFILES="record,tap",
                 ROBOT_RECORDS="true",
                 RECORDER_CONFIG=str(config),
             )

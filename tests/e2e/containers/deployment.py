@@ -23,7 +23,7 @@ from tests.support.free import free_domain, free_tcp_port, free_udp_port
 from tests.support.waiting import wait_until
 
 SERVICES = ("gateway", "preview")
-_GUARDED = (*SERVICES, "recorder", "bridge")
+_GUARDED = (*SERVICES, "recorder", "tap", "bridge")
 # Devices, and the kernel's own trees.
 _RUNTIME = ("/proc", "/sys", "/dev")
 

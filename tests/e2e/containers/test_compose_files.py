@@ -140,7 +140,7 @@ def test_what_a_robot_without_credentials_accepted_ends_with_the_overlay() -> No
 
 
 @pytest.mark.parametrize(
-    ("program", "profile"), [("gateway", ""), ("drive", "drive"), ("recorder", "record")]
+    ("program", "profile"), [("gateway", ""), ("drive", "drive"), ("recorder", "record"), ("tap", "tap")]
 )
 def test_what_speaks_ros_is_where_the_robots_nodes_are(program: str, profile: str) -> None:
     """And shares no memory with them: they are other users (gateway/ros/test_other_users.py)."""
@@ -151,7 +151,7 @@ def test_what_speaks_ros_is_where_the_robots_nodes_are(program: str, profile: st
     assert service["environment"][ros_transport.VARIABLE] == "udp"
 
 
-@pytest.mark.parametrize("program", ["gateway", "drive", "recorder"])
+@pytest.mark.parametrize("program", ["gateway", "drive", "recorder", "tap"])
 def test_the_demo_carries_ros_as_a_robot_does(program: str) -> None:
     services = config("demo", profile="*")["services"]
     assert services[program]["environment"][ros_transport.VARIABLE] == "udp"

@@ -10,13 +10,14 @@ from tests.e2e.containers.deployment import Deployment, mounts, writable
 
 pytestmark = [pytest.mark.docker, pytest.mark.timeout(900)]
 
-SERVICES = ("gateway", "preview", "recorder", "robot")
-USERS = {"gateway": 10001, "preview": 10002, "recorder": 10004, "robot": 10001}
+SERVICES = ("gateway", "preview", "recorder", "tap", "robot")
+USERS = {"gateway": 10001, "preview": 10002, "recorder": 10004, "tap": 10006, "robot": 10001}
 GROUP = 10000
 WRITABLE = {
     "gateway": {"/tmp", "/dev/shm"},
     "preview": {"/tmp", "/run/robot-gateway", "/run/robot-video", "/dev/shm"},
     "recorder": {"/tmp", "/run/robot-recorder", "/var/lib/robot-recorder", "/dev/shm"},
+    "tap": {"/tmp", "/run/robot-tap", "/dev/shm"},
     "robot": {"/tmp", "/dev/shm"},
 }
 _ON_THE_DISK = {"/var/lib/robot-recorder"}
@@ -79,6 +80,12 @@ def test_the_gateway_cannot_write_where_the_preview_listens(running: Deployment)
     assert "Read-only file system" in tried.stderr
 
 
+def test_the_preview_cannot_write_where_the_tap_listens(running: Deployment) -> None:
+    tried = running.run("exec", "preview", "touch", "/run/robot-tap/other.sock", check=False)
+    assert tried.returncode != 0
+    assert "Read-only file system" in tried.stderr
+
+
 def test_the_socket_is_for_the_two_alone(running: Deployment) -> None:
     directory = Path(f"/proc/{running.program_pid('preview')}/root/run/robot-gateway")
     assert (directory.stat().st_mode & 0o777, directory.stat().st_uid) == (0o750, USERS["preview"])
@@ -107,6 +114,7 @@ def test_only_the_declared_ports_listen(running: Deployment) -> None:
     assert listening_tcp(running.program_pid("gateway")) == {50051}
     assert listening_tcp(running.program_pid("preview")) == set()
     assert listening_tcp(running.program_pid("recorder")) == set()
+    assert listening_tcp(running.program_pid("tap")) == set()
     assert listening_tcp(running.program_pid("robot")) == set()
     udp = Path(f"/proc/{running.program_pid('preview')}/net/udp").read_text(encoding="ascii").splitlines()[1:]
     bound = {line.split()[1] for line in udp if not line.split()[1].startswith(_engine_dns())}
@@ -114,14 +122,16 @@ def test_only_the_declared_ports_listen(running: Deployment) -> None:
 
 
 def test_the_images_have_no_compiler_and_no_installer(running: Deployment) -> None:
-    for service in ("gateway", "preview", "recorder"):
+    for service in ("gateway", "preview", "recorder", "tap"):
         for tool in ("gcc", "cc", "g++", "cmake", "pip", "uv"):
             found = running.run("exec", service, "sh", "-c", f"command -v {tool}", check=False)
             assert found.returncode, f"{service} has {tool}: {found.stdout}"
 
 
 @pytest.mark.parametrize(
-    ("service", "cpus", "processes"), [("preview", 1.5, 256), ("recorder", 1.0, 128)], ids=str
+    ("service", "cpus", "processes"),
+    [("preview", 1.5, 256), ("recorder", 1.0, 128), ("tap", 1.0, 128)],
+    ids=str,
 )
 def test_limits_are_in_force(running: Deployment, service: str, cpus: float, processes: int) -> None:
     limits = running.inspect(service)["HostConfig"]
