@@ -19,16 +19,21 @@ _LOCK_TIMEOUT_S: Final = 5.0
 _LOCK_RETRY_S: Final = 0.02
 
 
-def write_private(path: Path, content: bytes) -> None:
+def write_private(path: Path, content: bytes, *, keep_owner: bool = False) -> None:
     """Replaces one file; see `write_all_private`."""
-    write_all_private({path: content})
+    write_all_private({path: content}, keep_owner=keep_owner)
 
 
-def write_all_private(contents: Mapping[Path, bytes]) -> None:
+def write_all_private(contents: Mapping[Path, bytes], *, keep_owner: bool = False) -> None:
     """Replaces files by new ones with mode 0600, in this order; creates missing directories with 0700.
 
     Each is replaced atomically (rename(2)), and none before all are on the disk: after an error they are as
     before, after a crash each has either the old or the new content. What was replaced survives a power loss.
+
+    Args:
+        contents: of the files, by path.
+        keep_owner: whether a file that is replaced keeps its owner and group, which takes the right to give
+            files away where they are not this user's.
 
     Raises:
         UserError: one can't be written.
@@ -43,6 +48,9 @@ def write_all_private(contents: Mapping[Path, bytes]) -> None:
             handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
             temporaries[target] = Path(name)
             with os.fdopen(handle, "wb") as file:
+                if keep_owner and target.exists():
+                    status = target.stat()
+                    os.fchown(handle, status.st_uid, status.st_gid)
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())

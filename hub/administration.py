@@ -7,6 +7,7 @@
 | `enroll` for an enrolled robot | refused, unless `again`: then new keys, and the old ones are revoked |
 | a server is down during `revoke` | the others refuse the robot at once, it as soon as it is back |
 | nothing of the hub answers during `revoke` | the revocation is in the directory; `apply` repeats it |
+| a server loses its disk | it knows the revocations of its nats.conf, and all after `apply` |
 """
 
 import json
@@ -19,7 +20,7 @@ from typing import Final
 
 from common.ca import KeyPair, issue_node_certificate, new_ca
 from common.errors import ExitCode, UserError
-from common.private_files import write_all_private
+from common.private_files import write_all_private, write_private
 from fleet import names
 from fleet.connection import Hub, connect
 from fleet.errors import HubError, HubReason
@@ -36,7 +37,7 @@ from fleet.identity import (
 from fleet.receipt_keys import ReceiptSigner, as_text, new_seed
 from hub import permissions, streams
 from hub.directory import HubDirectory, HubRecord, KeyName, Kind, User
-from hub.server_config import Node, Places, server_config
+from hub.server_config import Node, Places, server_config, with_accounts
 
 _CONNECT_S: Final = 5.0
 _CA_DAYS: Final = 3650.0
@@ -170,6 +171,46 @@ async def revoke(directory: HubDirectory, kind: Kind, name: str) -> None:
                 await _list_robot(hub, user)
 
 
+def refresh_nodes(directory: HubDirectory) -> list[str]:
+    """Writes all revocations into the servers' configuration, as far as it is in the directory.
+
+    A server reads it when it starts, and believes what is newer, it or its own disk: one that starts with an
+    empty disk knows nothing else.
+
+    Returns:
+        Which files could not be changed, and why.
+
+    Raises:
+        UserError: the directory is not a hub's.
+    """
+    nodes = directory.path / "nodes"
+    with directory.locked():
+        record = directory.read()
+        tokens = _account_tokens(_keys(directory), record.fleet, record.revoked)
+        try:
+            paths = sorted(each / "nats.conf" for each in nodes.iterdir())
+        except FileNotFoundError:
+            return []  # The servers have them, and no one else.
+        except OSError as error:
+            return [f"{nodes} can't be read: {error.strerror}"]
+        return [problem for path in paths if (problem := _refresh(path, tokens))]
+
+
+def _refresh(path: Path, tokens: Mapping[str, str]) -> str | None:
+    """Changes one server's configuration; returns why that failed."""
+    try:
+        text = with_accounts(path.read_text(encoding="utf-8"), tokens)
+        # For a container it belongs to the server, not to the administrator.
+        write_private(path, text.encode(), keep_owner=True)
+    except OSError as error:
+        return f"{path} can't be read: {error.strerror}"
+    except ValueError as error:
+        return f"{path} is not as init makes it: {error}"
+    except UserError as error:
+        return error.what
+    return None
+
+
 @dataclass(frozen=True, slots=True)
 class HubUse:
     """What the hub's streams have.
@@ -285,6 +326,10 @@ _KEYS: Final[dict[KeyName, KeyKind]] = {
 }
 
 
+def _keys(directory: HubDirectory) -> dict[KeyName, Key]:
+    return {name: directory.key(name) for name in _KEYS}
+
+
 def _account_tokens(keys: Mapping[KeyName, Key], fleet: str, revoked: Mapping[str, int]) -> dict[str, str]:
     """Returns the tokens of the three accounts, by public key."""
     services = permissions.SERVICES
@@ -360,9 +405,9 @@ def _with_revoked(record: HubRecord, keys: Sequence[str]) -> HubRecord:
 
 async def _push_accounts(directory: HubDirectory, record: HubRecord) -> None:
     """Gives the servers the accounts' tokens, with all revocations."""
-    keys = {name: directory.key(name) for name in _KEYS}
+    tokens = _account_tokens(_keys(directory), record.fleet, record.revoked)
     async with _connected(directory, system=True) as hub:
-        for token in _account_tokens(keys, record.fleet, record.revoked).values():
+        for token in tokens.values():
             answer = await hub.request("$SYS.REQ.CLAIMS.UPDATE", token.encode(), _PUSH_WITHIN_S)
             try:
                 error = json.loads(answer).get("error")

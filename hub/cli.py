@@ -79,9 +79,11 @@ def apply(
     events_mib: Annotated[int, typer.Option(min=1, help="Space for events, in MiB.")] = 8192,
     events_days: Annotated[int, typer.Option(min=1, max=3650, help="How long events are kept.")] = 30,
 ) -> None:
-    """Create the streams and buckets that are missing. Ends 1 when existing ones differ."""
+    """Create missing streams and buckets, repeat revocations. Ends 1 when existing streams differ."""
     limits = StreamLimits(events_mib * _MIB, events_days)
-    differences = _run(administration.apply(HubDirectory(directory), limits))
+    hub = HubDirectory(directory)
+    differences = _run(administration.apply(hub, limits))
+    _refresh_nodes(hub)
     for difference in differences:
         typer.echo(difference)
     if differences:
@@ -99,7 +101,10 @@ def enroll(
     again: Again = False,
 ) -> None:
     """Enroll a robot: its keys, its commands, its place in the list."""
-    _run(administration.enroll(HubDirectory(directory), name, out, days=days, again=again))
+    hub = HubDirectory(directory)
+    _run(administration.enroll(hub, name, out, days=days, again=again))
+    if again:
+        _refresh_nodes(hub)
     typer.echo(
         f"{name} is enrolled. Copy {out} to the robot, and point bridge.yaml at it; then delete it here."
     )
@@ -114,7 +119,9 @@ def revoke(
 ) -> None:
     """Make all credentials invalid; connections end at once."""
     kind: Kind = "operator" if operator else "receiver" if receiver else "robot"
-    _run(administration.revoke(HubDirectory(directory), kind, name))
+    hub = HubDirectory(directory)
+    _run(administration.revoke(hub, kind, name))
+    _refresh_nodes(hub)
     typer.echo(f"{name} is revoked.")
 
 
@@ -261,3 +268,13 @@ def _run(work: Coroutine[Any, Any, ResultT]) -> ResultT:
         }
         code = ExitCode.UNREACHABLE if error.reason is HubReason.UNREACHABLE else ExitCode.FAILED
         raise UserError(str(error), remedies.get(error.reason, "Try again"), exit_code=code) from error
+
+
+def _refresh_nodes(hub: HubDirectory) -> None:
+    """Writes the revocations into the servers' configuration in the directory; says where that failed."""
+    for problem in administration.refresh_nodes(hub):
+        typer.echo(
+            f"{problem}. It lacks revocations: when its server has lost its disk, type"
+            f"  robot-bridge hub apply --dir {hub.path}",
+            err=True,
+        )

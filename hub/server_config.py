@@ -1,9 +1,11 @@
 """The servers' configuration (nats.conf), one per node; for nats-server 2.9 and later."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+_PRELOAD: Final = re.compile(r"^resolver_preload \{\n.*?^\}$", re.MULTILINE | re.DOTALL)
 _LIMITS: Final = """\
 # Limits. A robot has one connection; people and receivers a few.
 max_connections: 4096
@@ -77,7 +79,6 @@ def server_config(
             setting: it syncs every two minutes.
     """
     sync = ", sync_interval: always" if sync_always else ""
-    preload = "\n".join(f"  {key}: {token}" for key, token in accounts.items())
     tls = (
         f'cert_file: "{places.config}/server.pem", key_file: "{places.config}/server.key",'
         f' ca_file: "{places.config}/ca.pem", timeout: 3'
@@ -93,9 +94,7 @@ tls {{ {tls} }}
 operator: {operator}
 system_account: {system_account}
 resolver {{ type: full, dir: "{places.data}/accounts", allow_delete: false, interval: "2m", limit: 100 }}
-resolver_preload {{
-{preload}
-}}
+{_preload(accounts)}
 
 # Each message is on the disk before it is acknowledged.
 jetstream {{ store_dir: "{places.data}/jetstream", max_mem: 64MB, max_file: {max_store}{sync} }}
@@ -113,3 +112,24 @@ cluster {{
 }}
 """
     return text
+
+
+def with_accounts(text: str, accounts: Mapping[str, str]) -> str:
+    """Returns a node's nats.conf with other tokens of accounts; all else, changed by hand or not, stays.
+
+    Args:
+        text: of the file.
+        accounts: tokens by public key.
+
+    Raises:
+        ValueError: the file has no such tokens.
+    """
+    replaced, count = _PRELOAD.subn(lambda _found: _preload(accounts), text)
+    if count != 1:
+        raise ValueError(f"it has {count} blocks resolver_preload, expected 1")
+    return replaced
+
+
+def _preload(accounts: Mapping[str, str]) -> str:
+    lines = "\n".join(f"  {key}: {token}" for key, token in accounts.items())
+    return f"resolver_preload {{\n{lines}\n}}"

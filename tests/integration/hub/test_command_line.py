@@ -3,6 +3,7 @@
 import asyncio
 import json
 import re
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -69,6 +70,18 @@ def test_a_robot_comes_and_goes(hub: Path, tmp_path: Path) -> None:
     assert re.search(r"r1 .* UTC", _type("robots", "--dir", str(hub)).output)
     with pytest.raises(RefusedError):
         asyncio.run(_publish(address))
+
+
+def test_a_configuration_that_can_not_carry_revocations_is_reported(hub: Path, tmp_path: Path) -> None:
+    _type("apply", "--dir", str(hub))
+    _type("enroll", "r1", "--dir", str(hub), "--out", str(tmp_path / "r1"))
+    (hub / "nodes" / "n1" / "nats.conf").write_text("port: 4222\n", encoding="utf-8")
+    result = _type("revoke", "r1", "--dir", str(hub))
+    assert "n1/nats.conf is not as init makes it" in result.output
+    assert f"hub apply --dir {hub}" in result.output
+    assert "r1 is revoked." in result.output
+    shutil.rmtree(hub / "nodes")
+    assert "nats.conf" not in _type("apply", "--dir", str(hub)).output, "the servers alone have theirs"
 
 
 def test_other_limits_are_reported_and_not_changed(hub: Path) -> None:

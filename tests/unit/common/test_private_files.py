@@ -55,3 +55,14 @@ def test_a_file_system_without_synchronised_directories_will_do(
     monkeypatch.setattr(os, "fsync", fsync)
     write_private(tmp_path / "file", b"content")
     assert (tmp_path / "file").read_bytes() == b"content"
+
+
+def test_a_file_of_another_user_stays_that_users(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[tuple[int, int]] = []
+    monkeypatch.setattr(os, "fchown", lambda _handle, user, group: given.append((user, group)))
+    write_private(tmp_path / "file", b"old", keep_owner=True)
+    assert given == [], "there was none"
+    write_private(tmp_path / "file", b"new", keep_owner=True)
+    status = (tmp_path / "file").stat()
+    assert given == [(status.st_uid, status.st_gid)]
+    assert (tmp_path / "file").read_bytes() == b"new"

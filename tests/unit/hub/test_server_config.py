@@ -1,6 +1,8 @@
 """The text of nats.conf; that servers take it, the integration tests show."""
 
-from hub.server_config import Node, Places, server_config
+import pytest
+
+from hub.server_config import Node, Places, server_config, with_accounts
 
 NODES = tuple(Node(f"n{number}", f"hub{number}.example") for number in (1, 2, 3))
 
@@ -34,3 +36,14 @@ def test_nodes_of_a_cluster_know_each_other_by_tls() -> None:
 
 def test_an_old_server_gets_no_setting_that_it_does_not_know() -> None:
     assert "sync_interval" not in _config(NODES[:1], sync_always=False)
+
+
+def test_other_tokens_change_nothing_else() -> None:
+    changed = _config(NODES).replace("max_connections: 4096", "max_connections: 100")
+    expected = changed.replace("ASYS: TOKEN", "ASYS: NEWER\n  AFLEET: TOKEN")
+    assert with_accounts(changed, {"ASYS": "NEWER", "AFLEET": "TOKEN"}) == expected
+
+
+def test_a_configuration_without_tokens_gets_none() -> None:
+    with pytest.raises(ValueError, match="0 blocks resolver_preload"):
+        with_accounts("port: 4222\n", {"ASYS": "TOKEN"})
