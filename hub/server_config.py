@@ -93,7 +93,8 @@ tls {{ {tls} }}
 
 operator: {operator}
 system_account: {system_account}
-resolver {{ type: full, dir: "{places.data}/accounts", allow_delete: false, interval: "2m", limit: 100 }}
+# At each interval nodes compare what they know of revocations: one that was down has missed some.
+resolver {{ type: full, dir: "{places.data}/accounts", allow_delete: false, interval: "2s", limit: 100 }}
 {_preload(accounts)}
 
 # Each message is on the disk before it is acknowledged.

@@ -2,18 +2,25 @@
 
 import asyncio
 import shutil
+import time
 from collections.abc import Iterator
+from contextlib import AsyncExitStack
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from fleet.connection import FleetAddress, connect
-from fleet.errors import RefusedError
+from fleet.errors import HubReason
+from hub import administration
 from hub.cli import app
 from tests.support.nats_servers import DEBIAN_SERVER, SERVER
 from tests.support.secure_hub import SecureHub, secure_hub
+from tests.support.waiting import wait_until
 
+_REVOKED_WITHIN_S = 5.0
+"""docs/fleet.md."""
 _SERVERS = [
     pytest.param(SERVER, id="newest"),
     pytest.param(
@@ -27,6 +34,15 @@ _SERVERS = [
 @pytest.fixture(params=_SERVERS)
 def hub(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[SecureHub]:
     with secure_hub(tmp_path, binary=request.param) as hub:
+        yield hub
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[SecureHub]:
+    """Three nodes; the administrator reaches the first one alone."""
+    with secure_hub(tmp_path, nodes=3) as hub:
+        record = hub.directory.read()
+        hub.directory.write(replace(record, servers=record.servers[:1]))
         yield hub
 
 
@@ -53,6 +69,43 @@ def test_apply_ends_what_a_server_with_an_old_configuration_has_forgotten(hub: S
     assert _admits(other)
 
 
+@pytest.mark.timed
+def test_a_revoked_robot_is_out_of_every_node(cluster: SecureHub) -> None:
+    robot = cluster.enroll("r1")
+    nodes = [_at(cluster, robot, node) for node in range(3)]
+
+    async def longest_s() -> float:
+        async with AsyncExitStack() as stack:
+            hubs = [await stack.enter_async_context(connect(each)) for each in nodes]
+            for hub in hubs:
+                await hub.connected(10.0)
+            begun_s = time.monotonic()
+            await administration.revoke(cluster.directory, "robot", "r1")
+            for hub in hubs:
+                left_s = _REVOKED_WITHIN_S - (time.monotonic() - begun_s)
+                assert await hub.changed.wait_until(lambda hub=hub: not hub.link.connected, left_s)  # type: ignore[misc]
+            return time.monotonic() - begun_s
+
+    assert asyncio.run(longest_s()) < _REVOKED_WITHIN_S
+    assert not any(_admits(each) for each in nodes)
+
+
+@pytest.mark.timed
+def test_a_node_that_was_down_learns_of_it_from_the_others(cluster: SecureHub) -> None:
+    robot, other = cluster.enroll("r1"), cluster.enroll("r2")
+    cluster.servers.kill(2)
+    asyncio.run(administration.revoke(cluster.directory, "robot", "r1"))
+    begun_s = time.monotonic()
+    cluster.servers.start_all()
+    wait_until(lambda: not _admits(_at(cluster, robot, 2)), "node 2 refuses it", _REVOKED_WITHIN_S)
+    assert time.monotonic() - begun_s < _REVOKED_WITHIN_S
+    assert _admits(_at(cluster, other, 2))
+
+
+def _at(hub: SecureHub, address: FleetAddress, node: int) -> FleetAddress:
+    return replace(address, servers=(hub.servers.urls[node],))
+
+
 def _type(hub: SecureHub, command: str, *words: str) -> None:
     done = CliRunner().invoke(
         app, [command, *words, "--dir", str(hub.directory.path)], catch_exceptions=False
@@ -70,10 +123,10 @@ def _lose_accounts(hub: SecureHub) -> None:
 def _admits(address: FleetAddress) -> bool:
     async def admitted() -> bool:
         async with connect(address) as robot:
-            try:
-                await robot.connected(2.0)
-            except RefusedError:
-                return False
-            return True
+            await robot.changed.wait_until(
+                lambda: robot.link.connected or robot.link.reason is not None, 10.0
+            )
+            assert robot.link.reason in {None, HubReason.REFUSED}, robot.link.text
+            return robot.link.connected
 
     return asyncio.run(admitted())
