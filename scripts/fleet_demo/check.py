@@ -16,7 +16,8 @@ from simrobot.control import ask
 _UP_WITHIN_S: Final = 150.0
 _SEEN_WITHIN_S: Final = 60.0
 _VERIFIED_WITHIN_S: Final = 90.0
-_REVOKED_WITHIN_S: Final = 30.0
+_REVOKED_WITHIN_S: Final = 5.0
+"""docs/fleet.md."""
 _FAULT: Final = "odometry"
 _AFFECTED: Final = "lab2"
 _RECORDING: Final = "lab1"
@@ -47,9 +48,7 @@ def check(ground: FleetGround, hub_s: float) -> None:
     with _step("get", ground) as say:
         say(_copied(ground, recording_id))
     with _step("revoke", ground) as say:
-        asyncio.run(administration.revoke(ground.hub.directory, "robot", _REVOKED))
-        ground.programs.wait_until(lambda: _is_revoked(ground), "the robot is revoked", _REVOKED_WITHIN_S)
-        say(f"{_REVOKED} is revoked, and its connection ended")
+        say(_revoked(ground))
     with _step("stop", ground) as say:
         ground.programs.stop()
         say("all programs ended in good order")
@@ -148,9 +147,24 @@ def _copied(ground: FleetGround, recording_id: str) -> str:
     return f"{answer['files']} files, {answer['size']} bytes, from the store; each is as the robot has it"
 
 
-def _is_revoked(ground: FleetGround) -> bool:
-    row = ground.rows().get(_REVOKED)
+def _revoked(ground: FleetGround) -> str:
+    wait_until = ground.programs.wait_until
+    wait_until(lambda: _is_connected(ground), "the robot is connected", _SEEN_WITHIN_S)
+    began_s = time.monotonic()
+    asyncio.run(administration.revoke(ground.hub.directory, "robot", _REVOKED))
+    left_s = _REVOKED_WITHIN_S - (time.monotonic() - began_s)
+    wait_until(lambda: not _is_connected(ground), f"out in {_REVOKED_WITHIN_S:g} s of its revocation", left_s)
+    took_s = time.monotonic() - began_s
+    wait_until(lambda: _is_shown_as_revoked(ground), "the table says so", _SEEN_WITHIN_S)
+    return f"{_REVOKED} is revoked, its connection ended after {took_s:.1f} s, and the table says so"
+
+
+def _is_connected(ground: FleetGround) -> bool:
     servers = ground.hub.servers
     connections = [each for node in range(NODES) for each in servers.monitor(node, "connz")["connections"]]
-    connected = any(each.get("name") == f"robot-bridge {_REVOKED}" for each in connections)
-    return row is not None and row["standing"] == "revoked" and not connected
+    return any(each.get("name") == f"robot-bridge {_REVOKED}" for each in connections)
+
+
+def _is_shown_as_revoked(ground: FleetGround) -> bool:
+    row = ground.rows().get(_REVOKED)
+    return row is not None and row["standing"] == "revoked"
