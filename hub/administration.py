@@ -43,6 +43,8 @@ _CONNECT_S: Final = 5.0
 _CA_DAYS: Final = 3650.0
 _SYSTEM: Final = Permissions(publish=("$SYS.REQ.CLAIMS.UPDATE",), subscribe=("_INBOX.>",))
 _PUSH_WITHIN_S: Final = 3.0
+_MADE: Final = {"keys", "nodes", "admin.creds", "system.creds", "receipts.key", "receipts.pub"}
+"""What an interrupted `create` leaves."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,13 +70,18 @@ def create(directory: HubDirectory, plan: HubPlan) -> None:
     """Creates keys, certificates and the servers' configuration. Nothing of it needs a server.
 
     Raises:
-        UserError: there is a hub in this directory, or it can't be written.
+        UserError: there is a hub in this directory or anything else, or it can't be written.
     """
     if not names.ROBOT_NAME.fullmatch(plan.fleet):
         raise _no_name(plan.fleet)
     with directory.locked():
         if directory.exists:
             raise UserError(f"{directory.path} has a hub already", "Choose another directory with --out")
+        # In a checkout, the folder of this package has the name that comes to mind, and goes into images.
+        if others := sorted({each.name for each in directory.path.iterdir()} - _MADE):
+            raise UserError(
+                f"{directory.path} has other files: {others[0]}", "Choose another directory with --out"
+            )
         keys = {name: Key.new(kind) for name, kind in _KEYS.items()}
         ca = new_ca(f"{plan.fleet} hub", _CA_DAYS)
         admin, _ = new_user(keys["fleet"], "administrator", permissions.administrator())

@@ -23,7 +23,7 @@ from hub.streams import StreamLimits
 
 app = typer.Typer(help="The fleet's hub: make it, enroll robots, revoke them.", no_args_is_help=True)
 
-_DEFAULT_DIR: Final = Path("hub")
+_DEFAULT_DIR: Final = Path("fleet-hub")
 _MIB: Final = 1024 * 1024
 ResultT = TypeVar("ResultT")
 Dir: TypeAlias = Annotated[

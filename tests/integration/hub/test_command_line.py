@@ -14,6 +14,7 @@ from common.errors import UserError
 from fleet import names
 from fleet.connection import Entry, FleetAddress, connect
 from fleet.errors import HubError, HubReason, RefusedError
+from hub import administration
 from hub.cli import app
 from tests.support.free import free_tcp_port
 from tests.support.nats_servers import NatsServers
@@ -173,6 +174,7 @@ def test_logins_of_people_and_receivers(hub: Path, tmp_path: Path) -> None:
         (("init", "--out", "{}/x", "--nodes", "3", "--host", "a"), "as many times --host"),
         (("init", "--out", "{}/x", "--nodes", "2", "--host", "a", "--host", "b"), "a cluster has three"),
         (("init", "--out", "{}/x", "--fleet", "No Name"), "is no name"),
+        (("init", "--out", str(Path(administration.__file__).parent)), "has other files: __init__.py"),
         (("apply", "--dir", "{}/missing"), "no hub's directory"),
         (("robots", "--dir", "{}/missing"), "no hub's directory"),
     ],
