@@ -20,11 +20,11 @@ OVERLAYS = ("", "rockchip", "v4l2", "vaapi", "demo", "guarded", "realtime")
 
 def config(*overlays: str, profile: str = "", own: Path | None = None) -> dict[str, Any]:
     """What compose makes of the base with overlays, and with a file of the robot's own."""
-    files = [
-        "compose.yaml",
-        *(f"compose.{name}.yaml" for name in overlays if name),
-        *([str(own)] if own else []),
-    ]
+    files = [f"compose.{name}.yaml" for name in overlays if name]
+    return resolved("compose.yaml", *files, *([str(own)] if own else []), profile=profile)
+
+
+def resolved(*files: str, profile: str) -> dict[str, Any]:
     words = [word for name in files for word in ("-f", name)]
     done = subprocess.run(
         ["docker", "compose", *words, "--profile", profile, "config", "--format", "json"],
@@ -36,8 +36,8 @@ def config(*overlays: str, profile: str = "", own: Path | None = None) -> dict[s
     )
     assert done.returncode == 0, done.stderr
     assert not done.stderr, "compose warns of something"
-    resolved: dict[str, Any] = json.loads(done.stdout)
-    return resolved
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
 
 
 @pytest.mark.parametrize("overlay", OVERLAYS)
@@ -159,11 +159,11 @@ def test_the_demo_carries_ros_as_a_robot_does(program: str) -> None:
 
 @pytest.mark.parametrize("overlay", ["", "rockchip", "v4l2", "vaapi"])
 def test_the_preview_publishes_one_udp_port_and_reaches_nothing(overlay: str) -> None:
-    resolved = config(overlay)
-    preview = resolved["services"]["preview"]
+    whole = config(overlay)
+    preview = whole["services"]["preview"]
     assert [(port["protocol"], port["target"]) for port in preview["ports"]] == [("udp", 7100)]
     assert list(preview["networks"]) == ["viewers"]
-    options = resolved["networks"]["viewers"]["driver_opts"]
+    options = whole["networks"]["viewers"]["driver_opts"]
     assert options["com.docker.network.bridge.enable_ip_masquerade"] == "false"
 
 
@@ -264,3 +264,23 @@ def test_the_demo_is_published_to_this_machine_alone() -> None:
     assert len(ports) == 2
     assert all(port["host_ip"] == "127.0.0.1" for port in ports)
     assert "network_mode" not in services["gateway"]
+
+
+def test_nodes_of_a_hub_on_one_machine_ask_for_no_port_twice() -> None:
+    services = resolved("deploy/hub/compose.three.yaml", profile="*")["services"]
+    published = {name: service.get("ports", []) for name, service in services.items()}
+    assert [name for name, ports in published.items() if ports] == ["exporter"]
+    assert [port["host_ip"] for port in published["exporter"]] == ["127.0.0.1"]
+    data = [services[name]["volumes"][1]["source"] for name in ("n1", "n2", "n3")]
+    assert len(set(data)) == 3
+
+
+@pytest.mark.parametrize("file", ["compose.yaml", "compose.three.yaml"])
+def test_every_service_of_a_hub_is_hardened_and_fetches_nothing(file: str) -> None:
+    for name, service in resolved(f"deploy/hub/{file}", profile="*")["services"].items():
+        assert service["read_only"], name
+        assert service["cap_drop"] == ["ALL"], name
+        assert "no-new-privileges:true" in service["security_opt"], name
+        assert service["pull_policy"] == "never", name
+        # The administration's own, which changes the servers' files.
+        assert ("cap_add" in service) == (name == "admin"), name
