@@ -37,7 +37,7 @@ _SHARING: Final = tuple(
 )
 LONGEST: Final = (
     *_SHARING,
-    *(f"{_CONTAINERS}test_{name}.py" for name in ("guarded", "bridge", "on_the_robot", "bad_ground")),
+    *(f"{_CONTAINERS}test_{name}.py" for name in ("guarded", "bridge", "on_the_robot", "hub", "bad_ground")),
     "tests/e2e/systemd/test_install.py",
     "tests/e2e/systemd/test_robot.py",
     "tests/integration/drive/test_doubt.py",

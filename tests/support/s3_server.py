@@ -63,10 +63,10 @@ class S3Server:
 
 
 @contextmanager
-def s3_server(directory: Path) -> Iterator[S3Server]:
-    """Serves when the block begins, gone when it ends."""
+def s3_server(directory: Path, host: str = "127.0.0.1") -> Iterator[S3Server]:
+    """Serves when the block begins, gone when it ends; containers reach it only at 0.0.0.0."""
     server = S3Server(free_tcp_port(), directory)
-    command = [sys.executable, "-m", "tests.support.moto_server", "-H", "127.0.0.1", "-p", str(server.port)]
+    command = [sys.executable, "-m", "tests.support.moto_server", "-H", host, "-p", str(server.port)]
     with (directory / "s3.log").open("wb") as log:
         process = subprocess.Popen(command, stdout=log, stderr=log)
 
