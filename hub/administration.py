@@ -178,6 +178,16 @@ async def revoke(directory: HubDirectory, kind: Kind, name: str) -> None:
                 await _list_robot(hub, user)
 
 
+async def push_revocations(directory: HubDirectory) -> None:
+    """Gives the servers all revocations; connections of who is revoked are closed.
+
+    Raises:
+        UserError: the hub can't be reached, or refuses; `apply` repeats it.
+    """
+    with directory.locked():
+        await _push_accounts(directory, directory.read())
+
+
 def refresh_nodes(directory: HubDirectory) -> list[str]:
     """Writes all revocations into the servers' configuration, as far as it is in the directory.
 

@@ -204,9 +204,12 @@ def operator(
                 exit_code=ExitCode.USAGE,
             )
         administration.operator_files(hub, name, out, days=days, again=again)
+        _end_old(hub, again=again)
         typer.echo(f"{out}: credentials of a program that reads the hub.")
         return
-    typer.echo(administration.operator_login(hub, name, commands=commands, days=days, again=again), nl=False)
+    login = administration.operator_login(hub, name, commands=commands, days=days, again=again)
+    _end_old(hub, again=again)
+    typer.echo(login, nl=False)
 
 
 @app.command("receiver-credentials")
@@ -218,7 +221,9 @@ def receiver_credentials(
     again: Again = False,
 ) -> None:
     """Write the files of a receiver of recordings."""
-    administration.receiver_files(HubDirectory(directory), name, out, days=days, again=again)
+    hub = HubDirectory(directory)
+    administration.receiver_files(hub, name, out, days=days, again=again)
+    _end_old(hub, again=again)
     typer.echo(f"{out}: credentials and signing key of the receiver.")
 
 
@@ -268,6 +273,13 @@ def _run(work: Coroutine[Any, Any, ResultT]) -> ResultT:
         }
         code = ExitCode.UNREACHABLE if error.reason is HubReason.UNREACHABLE else ExitCode.FAILED
         raise UserError(str(error), remedies.get(error.reason, "Try again"), exit_code=code) from error
+
+
+def _end_old(hub: HubDirectory, *, again: bool) -> None:
+    """Has the servers refuse what new credentials have replaced."""
+    if again:
+        _run(administration.push_revocations(hub))
+        _refresh_nodes(hub)
 
 
 def _refresh_nodes(hub: HubDirectory) -> None:

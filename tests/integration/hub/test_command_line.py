@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,7 @@ from fleet.connection import Entry, FleetAddress, connect
 from fleet.errors import HubError, HubReason, RefusedError
 from hub import administration
 from hub.cli import app
+from hub.directory import HubDirectory
 from tests.support.free import free_tcp_port
 from tests.support.nats_servers import NatsServers
 
@@ -169,6 +171,26 @@ def test_logins_of_people_and_receivers(hub: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("command", "file"),
+    [
+        (("operator", "exporter", "--out"), "operator.creds"),
+        (("receiver-credentials", "--out"), "receiver.creds"),
+    ],
+)
+def test_new_credentials_end_the_old_ones(
+    hub: Path, tmp_path: Path, command: tuple[str, ...], file: str
+) -> None:
+    _type("apply", "--dir", str(hub))
+    address = HubDirectory(hub).address("admin")
+    for out in ("old", "new"):
+        again = ("--again",) if out == "new" else ()
+        _type(*command, str(tmp_path / out), "--dir", str(hub), *again)
+    asyncio.run(_connected(replace(address, credentials=tmp_path / "new" / file)))
+    with pytest.raises(RefusedError):
+        asyncio.run(_connected(replace(address, credentials=tmp_path / "old" / file)))
+
+
+@pytest.mark.parametrize(
     ("words", "error"),
     [
         (("init", "--out", "{}/x", "--nodes", "3", "--host", "a"), "as many times --host"),
@@ -195,6 +217,11 @@ def test_a_hub_that_is_off_is_reported(tmp_path: Path) -> None:
         _type("enroll", "r1", "--dir", str(made), "--out", str(tmp_path / "r1"))
     assert refused.value.exit_code == 3
     assert not (tmp_path / "r1").exists()
+
+
+async def _connected(address: FleetAddress) -> None:
+    async with connect(address) as hub:
+        await hub.connected(2)
 
 
 async def _listed(address: FleetAddress) -> dict[str, Entry]:
