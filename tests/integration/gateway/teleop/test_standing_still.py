@@ -18,6 +18,7 @@ from console.client import (
     DrivePhase,
     DriveSession,
     GatewayError,
+    Refused,
     StopLatch,
 )
 from tests.support.driven_robot import BY_EYE, DrivenRobot, available, driven_robot, held, in_motion
@@ -98,7 +99,7 @@ async def test_a_drive_program_that_is_started_again_gets_the_lease_and_moves_on
         assert not robot.base.moves, "the last message is zero"
         assert robot.base.stopped_after_s(began_s) < QUIET_S
     async with AsyncGatewayClient(robot.target) as other:
-        await other.reset_stop(stop)
+        await eventually(lambda: is_reset(other, stop), bool, "reset when the release has arrived")
     await asyncio.sleep(QUIET_S)
     assert not robot.base.moves, "a reset moves nothing"
     # The new process has to discover the base first.
@@ -136,6 +137,14 @@ async def reached(session: DriveSession, inhibit: DriveInhibit) -> bool:
             if inhibit in state.inhibits:
                 return True
     return False
+
+
+async def is_reset(client: AsyncGatewayClient, stop_id: int) -> bool:
+    try:
+        await client.reset_stop(stop_id)
+    except Refused:
+        return False
+    return True
 
 
 async def stop_of(session: DriveSession) -> int:
