@@ -5,7 +5,7 @@
 | `init` is interrupted | there is no hub.json: it can be repeated |
 | the hub is unreachable during `enroll` | the robot's files are not written; repeat it |
 | `enroll` for an enrolled robot | refused, unless `again`: then new keys, and the old ones are revoked |
-| a server is down during `revoke` | the others refuse the robot at once, it within 5 s of its start |
+| a server is down during `revoke` | the others refuse the robot at once, it within 15 s of its start |
 | nothing of the hub answers during `revoke` | the revocation is in the directory; `apply` repeats it |
 | a server loses its disk | it knows the revocations of its nats.conf, and all after `apply` |
 """

@@ -6,13 +6,14 @@ import time
 from collections.abc import Iterator
 from contextlib import AsyncExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from fleet.connection import FleetAddress, connect
-from fleet.errors import HubReason
+from fleet.errors import HubError, HubReason
 from hub import administration
 from hub.cli import app
 from tests.support.nats_servers import DEBIAN_SERVER, SERVER
@@ -20,7 +21,8 @@ from tests.support.secure_hub import SecureHub, secure_hub
 from tests.support.waiting import wait_until
 
 _REVOKED_WITHIN_S = 5.0
-"""docs/fleet.md."""
+_LEARNED_WITHIN_S = 15.0
+"""Both: docs/fleet.md. The second one is from a node's start, with the way back into the cluster."""
 _SERVERS = [
     pytest.param(SERVER, id="newest"),
     pytest.param(
@@ -94,11 +96,11 @@ def test_a_revoked_robot_is_out_of_every_node(cluster: SecureHub) -> None:
 def test_a_node_that_was_down_learns_of_it_from_the_others(cluster: SecureHub) -> None:
     robot, other = cluster.enroll("r1"), cluster.enroll("r2")
     cluster.servers.kill(2)
-    asyncio.run(administration.revoke(cluster.directory, "robot", "r1"))
-    begun_s = time.monotonic()
-    cluster.servers.start_all()
-    wait_until(lambda: not _admits(_at(cluster, robot, 2)), "node 2 refuses it", _REVOKED_WITHIN_S)
-    assert time.monotonic() - begun_s < _REVOKED_WITHIN_S
+    # Until the list of robots has a leader again, the administrator is to try again.
+    wait_until(lambda: _revoked(cluster, "r1"), "the robot is revoked", 30.0)
+    cluster.servers.start(2)
+    refused = partial(_answer, _at(cluster, robot, 2))
+    wait_until(lambda: refused() is HubReason.REFUSED, "node 2 refuses it", _LEARNED_WITHIN_S)
     assert _admits(_at(cluster, other, 2))
 
 
@@ -120,13 +122,28 @@ def _lose_accounts(hub: SecureHub) -> None:
     hub.servers.start_all()
 
 
+def _revoked(hub: SecureHub, robot: str) -> bool:
+    try:
+        asyncio.run(administration.revoke(hub.directory, "robot", robot))
+    except HubError:
+        return False
+    return True
+
+
 def _admits(address: FleetAddress) -> bool:
-    async def admitted() -> bool:
+    reason = _answer(address)
+    assert reason in {None, HubReason.REFUSED}
+    return reason is None
+
+
+def _answer(address: FleetAddress) -> HubReason | None:
+    """Why there is no connection; None: there is one."""
+
+    async def answer() -> HubReason | None:
         async with connect(address) as robot:
             await robot.changed.wait_until(
                 lambda: robot.link.connected or robot.link.reason is not None, 10.0
             )
-            assert robot.link.reason in {None, HubReason.REFUSED}, robot.link.text
-            return robot.link.connected
+            return robot.link.reason
 
-    return asyncio.run(admitted())
+    return asyncio.run(answer())
