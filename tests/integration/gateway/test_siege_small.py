@@ -18,8 +18,8 @@ CONNECTION_KIB = 64
 to 53 here, with what those cost that are cut off and come back."""
 CALL_KIB = 25
 """What a call costs whose refusal is delayed (gateway/rpc/connections/refusal_delay.py)."""
-CALLS = 32
-"""That a connection may have open (docs/security.md)."""
+CALLS = 256
+"""That a connection may have open."""
 
 
 @pytest.fixture(scope="module")
