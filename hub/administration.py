@@ -10,6 +10,7 @@
 | a server loses its disk | it knows the revocations of its nats.conf, and all after `apply` |
 """
 
+import asyncio
 import json
 import time
 from collections.abc import AsyncGenerator, Mapping, Sequence
@@ -18,6 +19,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
+from common.backoff import Backoff
 from common.ca import KeyPair, issue_node_certificate, new_ca
 from common.errors import ExitCode, UserError
 from common.private_files import write_all_private, write_private
@@ -43,6 +45,8 @@ _CONNECT_S: Final = 5.0
 _CA_DAYS: Final = 3650.0
 _SYSTEM: Final = Permissions(publish=("$SYS.REQ.CLAIMS.UPDATE",), subscribe=("_INBOX.>",))
 _PUSH_WITHIN_S: Final = 3.0
+_ELECTED_WITHIN_S: Final = 15.0
+"""A cluster that lost a server has a leader again by then (docs/fleet.md)."""
 _MADE: Final = {"keys", "nodes", "admin.creds", "system.creds", "receipts.key", "receipts.pub"}
 """What an interrupted `create` leaves."""
 
@@ -435,9 +439,22 @@ async def _push_accounts(directory: HubDirectory, record: HubRecord) -> None:
 
 
 async def _list_robot(hub: Hub, user: User) -> None:
-    """Puts a robot into the bucket that consoles read."""
+    """Puts a robot into the bucket that consoles read; while that elects its leader, tries again.
+
+    Raises:
+        HubError: nothing took it for _ELECTED_WITHIN_S.
+    """
     entry = {"robot": user.name, "revoked": user.revoked is not None, "revoked_unix_s": user.revoked}
-    await hub.put(names.ROBOTS, user.name, json.dumps(entry).encode())
+    retry, deadline_s = Backoff(0.1, 1.0), time.monotonic() + _ELECTED_WITHIN_S
+    while True:
+        try:
+            await hub.put(names.ROBOTS, user.name, json.dumps(entry).encode())
+        except HubError as error:
+            if error.reason is not HubReason.NO_RESPONDERS or time.monotonic() > deadline_s:
+                raise
+            await asyncio.sleep(retry.next_s())
+        else:
+            return
 
 
 @asynccontextmanager
