@@ -160,8 +160,8 @@ class State:
     def heard(self, now_ns: int) -> bool:
         """Whether the driver of a stream is there: the newest command is still valid.
 
-        A lease alone proves no driver. It outlives the driver's program by up to 2 s, and a tool without a
-        stream has nobody behind it when its command is over.
+        A lease alone proves no driver. It outlives the driver's program by up to 2 s, and that of a tool
+        without a stream outlives its only command.
         """
         streaming = self.lease is not None and self.lease.streaming
         return streaming and self.command is not None and now_ns <= self.command.valid_until_ns

@@ -109,7 +109,7 @@ class Stops:
     """Stops the robot, for anyone, and resets that.
 
     A stop that the drive program does not confirm is kept, the newest one alone, and is the first message of
-    the next connection, however late that comes: nobody has called it off. Its caller was told so.
+    the next connection, however late that comes, because no reset has undone it. Its caller knows that.
 
     Args:
         link: to the drive program.
@@ -155,7 +155,7 @@ class Stops:
     async def _stop_anew(self, by: str, reason: str) -> StopLatch:
         """Sends a stop, unless one of the same caller is on its way, and waits until it is confirmed.
 
-        Nobody has seen the number of one that is on its way.
+        The number of one that is on its way is not known to any caller yet.
         """
         if sent := self._sent.get(by):
             await self._wait_for_confirmation(sent)

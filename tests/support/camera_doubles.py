@@ -1,7 +1,7 @@
 """A GStreamer element with the name, the properties and the failures of v4l2src, around a test pattern.
 
 CAMERA_DOUBLES holds JSON: device -> {"modes": [[caps, pattern], ...], "fault": word}. A mode is what a driver
-lists: one format with one size and one rate. Its pattern tells which one was negotiated.
+lists: one format with one size and one rate. Its pattern shows which one was negotiated.
 
 | word | what happens |
 |---|---|
@@ -23,7 +23,7 @@ from common.gst import GLib, GObject, Gst
 
 VARIABLE = "CAMERA_DOUBLES"
 _LARGEST = (3840, 2160, 120)
-"""What v4l2src prefers where its peer has no wish: width, height and rate (gst_v4l2src_negotiate)."""
+"""What v4l2src prefers where its peer prefers nothing: width, height and rate (gst_v4l2src_negotiate)."""
 
 _FRAMES = Gst.PadTemplate.new(
     "src",
@@ -124,15 +124,15 @@ class Camera(Gst.Bin):  # type: ignore[misc]  # gi has no types
 
 
 def _negotiated(modes: list[_Mode], wanted: Any) -> _Mode | None:
-    """What v4l2src takes: the nearest to its peer's first wish, the rate before the size."""
+    """What v4l2src takes: the nearest to its peer's first structure, the rate before the size."""
     possible = [mode for mode in modes if Gst.Caps.from_string(mode.caps).can_intersect(wanted)]
     width, height, fps = _LARGEST
     if not wanted.is_any():
-        wish = wanted.get_structure(0).copy()
-        wish.fixate_field_nearest_int("width", width)
-        wish.fixate_field_nearest_int("height", height)
-        wish.fixate_field_nearest_fraction("framerate", fps, 1)
-        width, height, fps = _figures(wish, (width, height, fps))
+        preferred = wanted.get_structure(0).copy()
+        preferred.fixate_field_nearest_int("width", width)
+        preferred.fixate_field_nearest_int("height", height)
+        preferred.fixate_field_nearest_fraction("framerate", fps, 1)
+        width, height, fps = _figures(preferred, (width, height, fps))
 
     def distance(mode: _Mode) -> tuple[int, int]:
         own = _figures(Gst.Caps.from_string(mode.caps).get_structure(0), _LARGEST)

@@ -1,4 +1,4 @@
-"""What a base was told, and so how long it moves after a fault. Pure."""
+"""The velocities that a base has received, and so how long it moves after a fault. Pure."""
 
 import math
 from dataclasses import dataclass, field
