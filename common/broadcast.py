@@ -2,6 +2,17 @@
 
 import asyncio
 from collections.abc import AsyncGenerator, Callable
+from typing import Final
+
+HEARTBEAT_S: Final = 1.0
+"""Longest pause between the reports of a service in which nothing changes.
+
+The gateway gives a service up after 2.5 s of silence: two reports in a row may be late, on a busy machine.
+"""
+
+
+def _idle() -> float:
+    return HEARTBEAT_S
 
 
 class Broadcast:
@@ -30,7 +41,7 @@ class Broadcast:
             return False
         return True
 
-    async def now_and_on_change(self, heartbeat_s: Callable[[], float]) -> AsyncGenerator[None]:
+    async def now_and_on_change(self, heartbeat_s: Callable[[], float] = _idle) -> AsyncGenerator[None]:
         """Yields now, on each notification, and at least every so many seconds, without end.
 
         Args:

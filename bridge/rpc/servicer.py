@@ -19,7 +19,6 @@ from omniseer.fleet.v1 import command_pb2
 
 SERVICE: Final = pb.DESCRIPTOR.services_by_name["BridgeService"].full_name
 
-_HEARTBEAT_S: Final = 1.0
 _MS_PER_S: Final = 1000
 OUTCOMES: Final = {
     pb.REQUEST_OUTCOME_DONE: command_pb2.COMMAND_OUTCOME_DONE,
@@ -52,7 +51,7 @@ class BridgeServicer(pb_grpc.BridgeServiceServicer):
         self, _request: pb.WatchStateRequest, _context: grpc.aio.ServicerContext[Any, Any]
     ) -> AsyncIterator[pb.WatchStateResponse]:
         """Streams the state, now, on every change and every second; a slow reader skips outdated ones."""
-        async for _ in self._status.changes.now_and_on_change(lambda: _HEARTBEAT_S):
+        async for _ in self._status.changes.now_and_on_change():
             yield self._state()
 
     async def UploadRecording(  # noqa: N802  # the schema names it

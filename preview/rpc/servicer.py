@@ -5,6 +5,7 @@ from typing import Any, Final
 
 import grpc
 
+from common.broadcast import HEARTBEAT_S
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from omniseer.preview.v1 import preview_service_pb2_grpc as pb_grpc
 from preview.encoders.catalogue import Encoder
@@ -14,7 +15,6 @@ from preview.supervisor import Supervisor
 
 SERVICE: Final = pb.DESCRIPTOR.services_by_name["PreviewService"].full_name
 
-_HEARTBEAT_S: Final = 2.0
 _HEARTBEAT_WITH_PIPELINE_S: Final = 0.5
 
 
@@ -56,7 +56,7 @@ class PreviewServicer(pb_grpc.PreviewServiceServicer):
             while True:
                 sent = self._supervisor.actual()
                 yield pb.WatchActualStateResponse(actual=mapping.actual_state(sent))
-                heartbeat_s = _HEARTBEAT_WITH_PIPELINE_S if sent.stream else _HEARTBEAT_S
+                heartbeat_s = _HEARTBEAT_WITH_PIPELINE_S if sent.stream else HEARTBEAT_S
                 await self._supervisor.changes.wait_until(changed, heartbeat_s)
 
     async def ListEncoders(  # noqa: N802  # the schema names it

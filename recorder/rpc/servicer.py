@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import grpc
 
+from common.broadcast import HEARTBEAT_S
 from common.errors import InvalidRequestError, NotFoundError, PreconditionError
 from common.reasons import Reason
 from omniseer.gateway.v1 import recording_pb2 as pb
@@ -27,7 +28,6 @@ from recorder.thumbnail import find_thumbnail
 
 SERVICE: Final = recorder_pb.DESCRIPTOR.services_by_name["RecorderService"].full_name
 
-_HEARTBEAT_S: Final = 2.0
 _HEARTBEAT_WRITING_S: Final = 0.5
 _PAGE: Final = 50
 _LARGEST_PAGE: Final = 200
@@ -202,7 +202,7 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         return recorder_pb.SetCopyResponse()
 
     def _heartbeat_s(self) -> float:
-        return _HEARTBEAT_WRITING_S if self._status_reader.writes else _HEARTBEAT_S
+        return _HEARTBEAT_WRITING_S if self._status_reader.writes else HEARTBEAT_S
 
     def _recording_of(self, result: Result) -> pb.Recording | None:
         return mapping.recording(self._status_reader, result.recording) if result.recording else None

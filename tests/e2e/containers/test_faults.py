@@ -126,7 +126,7 @@ def test_without_a_gateway_the_preview_stops_by_itself(tmp_path: Path) -> None:
     config.write_text("source: {kind: test}\ntimeouts: {without_gateway_s: 2}\n", encoding="utf-8")
     with deployed(tmp_path, demo_overlay(), PREVIEW_CONFIG=str(config)) as demo, demo.client() as robot:
         demo.wait_for_status(robot)
-        robot.enable_preview()
+        assert robot.enable_preview().preview.state is PreviewState.RUNNING
         assert demo.preview_port in udp_ports(demo, "preview")
         demo.run("stop", "gateway")
         # The unit test asserts in virtual time how long it takes; here the engine may be busy.

@@ -89,7 +89,7 @@ class PreviewServiceServicer:
 
     def WatchActualState(self, request, context):
         """The actual state now, then on every change, and at least every 500 ms while a pipeline exists
-        (every 2 s otherwise, as a heartbeat). A slow reader gets the newest state, never a backlog.
+        (every second otherwise, as a heartbeat). A slow reader gets the newest state, never a backlog.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -48,7 +48,7 @@ class PreviewServiceStub:
     """
     WatchActualState: _grpc.UnaryStreamMultiCallable[_preview_service_pb2.WatchActualStateRequest, _preview_service_pb2.WatchActualStateResponse]
     """The actual state now, then on every change, and at least every 500 ms while a pipeline exists
-    (every 2 s otherwise, as a heartbeat). A slow reader gets the newest state, never a backlog.
+    (every second otherwise, as a heartbeat). A slow reader gets the newest state, never a backlog.
     """
     ListEncoders: _grpc.UnaryUnaryMultiCallable[_preview_service_pb2.ListEncodersRequest, _preview_service_pb2.ListEncodersResponse]
     """Every encoder of the catalogue and the result of its trial. The first call may take some seconds,
@@ -85,7 +85,7 @@ class PreviewServiceAsyncStub(PreviewServiceStub):
     """
     WatchActualState: _aio.UnaryStreamMultiCallable[_preview_service_pb2.WatchActualStateRequest, _preview_service_pb2.WatchActualStateResponse]  # type: ignore[assignment]
     """The actual state now, then on every change, and at least every 500 ms while a pipeline exists
-    (every 2 s otherwise, as a heartbeat). A slow reader gets the newest state, never a backlog.
+    (every second otherwise, as a heartbeat). A slow reader gets the newest state, never a backlog.
     """
     ListEncoders: _aio.UnaryUnaryMultiCallable[_preview_service_pb2.ListEncodersRequest, _preview_service_pb2.ListEncodersResponse]  # type: ignore[assignment]
     """Every encoder of the catalogue and the result of its trial. The first call may take some seconds,
@@ -131,7 +131,7 @@ class PreviewServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_preview_service_pb2.WatchActualStateResponse], _abc.AsyncIterator[_preview_service_pb2.WatchActualStateResponse]]:
         """The actual state now, then on every change, and at least every 500 ms while a pipeline exists
-        (every 2 s otherwise, as a heartbeat). A slow reader gets the newest state, never a backlog.
+        (every second otherwise, as a heartbeat). A slow reader gets the newest state, never a backlog.
         """
 
     @_abc_1.abstractmethod

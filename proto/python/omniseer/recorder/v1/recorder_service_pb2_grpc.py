@@ -119,8 +119,8 @@ class RecorderServiceServicer:
     """
 
     def WatchState(self, request, context):
-        """The actual state now, then on every change, at least every 500 ms while something is written, and every 2 s
-        otherwise. A slow reader gets the newest state, never a backlog.
+        """The actual state now, then on every change, at least every 500 ms while something is written, and every
+        second otherwise. A slow reader gets the newest state, never a backlog.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -44,8 +44,8 @@ class RecorderServiceStub:
     @_typing.overload
     def __new__(cls, channel: _aio.Channel) -> RecorderServiceAsyncStub: ...
     WatchState: _grpc.UnaryStreamMultiCallable[_recorder_service_pb2.WatchStateRequest, _recorder_service_pb2.WatchStateResponse]
-    """The actual state now, then on every change, at least every 500 ms while something is written, and every 2 s
-    otherwise. A slow reader gets the newest state, never a backlog.
+    """The actual state now, then on every change, at least every 500 ms while something is written, and every
+    second otherwise. A slow reader gets the newest state, never a backlog.
     """
     StartRecording: _grpc.UnaryUnaryMultiCallable[_recording_pb2.StartRecordingRequest, _recording_pb2.StartRecordingResponse]
     """As RecordingService.StartRecording."""
@@ -96,8 +96,8 @@ class RecorderServiceAsyncStub(RecorderServiceStub):
 
     def __init__(self, channel: _aio.Channel) -> None: ...
     WatchState: _aio.UnaryStreamMultiCallable[_recorder_service_pb2.WatchStateRequest, _recorder_service_pb2.WatchStateResponse]  # type: ignore[assignment]
-    """The actual state now, then on every change, at least every 500 ms while something is written, and every 2 s
-    otherwise. A slow reader gets the newest state, never a backlog.
+    """The actual state now, then on every change, at least every 500 ms while something is written, and every
+    second otherwise. A slow reader gets the newest state, never a backlog.
     """
     StartRecording: _aio.UnaryUnaryMultiCallable[_recording_pb2.StartRecordingRequest, _recording_pb2.StartRecordingResponse]  # type: ignore[assignment]
     """As RecordingService.StartRecording."""
@@ -151,8 +151,8 @@ class RecorderServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _recorder_service_pb2.WatchStateRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_recorder_service_pb2.WatchStateResponse], _abc.AsyncIterator[_recorder_service_pb2.WatchStateResponse]]:
-        """The actual state now, then on every change, at least every 500 ms while something is written, and every 2 s
-        otherwise. A slow reader gets the newest state, never a backlog.
+        """The actual state now, then on every change, at least every 500 ms while something is written, and every
+        second otherwise. A slow reader gets the newest state, never a backlog.
         """
 
     @_abc_1.abstractmethod
