@@ -22,7 +22,7 @@ from gateway.ros.field_types import FieldMissingError, check_field
 from gateway.ros.readers.field_path import steps_of, value_at
 from hub.exporter.collector import FleetCollector
 from hub.receiver.service import Party, ReceiverService
-from hub.receiver.store import StoredObject, StoredPart, StoreError, StoreProblem
+from hub.receiver.store import Store, StoredObject, StoredPart, StoreError, StoreProblem
 from omniseer.fleet.v1 import upload_pb2
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus
 from tests.support.control_characters import CONTROL_CHARACTERS
@@ -97,7 +97,7 @@ def receivers_request(data: bytes) -> None:
     signer = ReceiptSigner(bytes(32))
     service = ReceiverService(
         Party("lab", signer, (signer.public_key,)),
-        store,  # type: ignore[arg-type]  # in memory
+        store,
         _Records(),
         _Inline(),
     )
@@ -162,7 +162,7 @@ class _Records:
         assert key.startswith(f"{ROBOT}.")
 
 
-class _Store:
+class _Store(Store):
     """A store with one object under every key; notes the keys."""
 
     def __init__(self) -> None:
@@ -179,26 +179,41 @@ class _Store:
         self.keys.append(key)
         return None if "recei" in key else b"abc"[:most]
 
-    def stream(self, key: str, _etag: str) -> Iterator[bytes]:
+    def stream(self, key: str, etag: str) -> Iterator[bytes]:
+        assert etag
         self.keys.append(key)
         yield b"abc"
 
-    def write(self, key: str, _content: bytes) -> None:
+    def write(self, key: str, content: bytes) -> None:
+        assert len(content) <= _LONGEST_ANSWER
         self.keys.append(key)
 
-    def delete(self, key: str) -> None:
+    def create(self, key: str) -> None:
         self.keys.append(key)
+
+    def delete(self, key: str, etag: str) -> None:
+        assert etag
+        self.keys.append(key)
+
+    def sizes(self, prefix: str, most: int) -> dict[str, int]:
+        assert most > 0
+        key = f"{prefix}data.mcap"
+        self.keys.append(key)
+        return {key: 3}
 
     def open_upload(self, key: str) -> str:
         self.keys.append(key)
         return "u1"
 
-    def parts(self, key: str, _upload_id: str) -> list[StoredPart]:
+    def parts(self, key: str, upload_id: str) -> list[StoredPart]:
+        assert upload_id
         self.keys.append(key)
         return [StoredPart(1, "e", 3)]
 
-    def part_url(self, key: str, _upload_id: str, _number: int, size: int) -> str:
+    def part_url(self, key: str, upload_id: str, number: int, size: int) -> str:
         self.keys.append(key)
+        assert upload_id
+        assert number > 0
         assert size > 0
         return "https://store/part"
 
@@ -206,6 +221,6 @@ class _Store:
         self.keys.append(key)
         return "https://store/file"
 
-    def complete(self, key: str, _upload_id: str, _parts: Sequence[tuple[int, str]]) -> None:
+    def complete(self, key: str, upload_id: str, parts: Sequence[tuple[int, str]]) -> None:
         self.keys.append(key)
-        raise StoreError(StoreProblem.MISSING, "the store does not have it")
+        raise StoreError(StoreProblem.MISSING, f"the store has no upload {upload_id!r} of {len(parts)} parts")

@@ -1,5 +1,6 @@
 """Good inputs to begin with: a fuzzer that starts from nothing takes long to learn a format."""
 
+import hashlib
 import struct
 from typing import Any, Final
 
@@ -117,22 +118,33 @@ def _chunk_content() -> bytes:
 def _receivers_requests() -> list[bytes]:
     """One of each, in the form of the target."""
     file = recording_pb2.RecordingFile(name="data.mcap", size=3, sha256=bytes(32))
-    requests = {
-        "begin_upload": upload_pb2.BeginUploadRequest(recording=recording_pb2.Recording(id="r1")),
-        "begin_file": upload_pb2.BeginFileRequest(recording_id="r1", file=file),
-        "get_parts": upload_pb2.GetPartsRequest(
-            recording_id="r1", file_name="data.mcap", file_size=3, upload_id="u1", numbers=[1]
+    empty = recording_pb2.RecordingFile(name="empty.mcap", sha256=hashlib.sha256().digest())
+    requests = (
+        ("begin_upload", upload_pb2.BeginUploadRequest(recording=recording_pb2.Recording(id="r1"))),
+        ("begin_file", upload_pb2.BeginFileRequest(recording_id="r1", file=file)),
+        ("begin_file", upload_pb2.BeginFileRequest(recording_id="r1", file=empty)),
+        (
+            "get_parts",
+            upload_pb2.GetPartsRequest(
+                recording_id="r1", file_name="data.mcap", file_size=3, upload_id="u1", numbers=[1]
+            ),
         ),
-        "complete_file": upload_pb2.CompleteFileRequest(
-            recording_id="r1", file_name="a", upload_id="u1", parts=[upload_pb2.Part(number=1, etag="e")]
+        (
+            "complete_file",
+            upload_pb2.CompleteFileRequest(
+                recording_id="r1", file_name="a", upload_id="u1", parts=[upload_pb2.Part(number=1, etag="e")]
+            ),
         ),
-        "verify_file": upload_pb2.VerifyFileRequest(recording_id="r1", file=file),
-        "complete_upload": upload_pb2.CompleteUploadRequest(
-            recording=recording_pb2.Recording(id="r1", size=3), file_names=["a"]
+        ("verify_file", upload_pb2.VerifyFileRequest(recording_id="r1", file=file)),
+        (
+            "complete_upload",
+            upload_pb2.CompleteUploadRequest(
+                recording=recording_pb2.Recording(id="r1", size=3), file_names=["a"]
+            ),
         ),
-        "get_files": upload_pb2.GetFilesRequest(recording_id="r1", file_names=["a"]),
-    }
-    return [bytes([REQUESTS.index(name)]) + each.SerializeToString() for name, each in requests.items()]
+        ("get_files", upload_pb2.GetFilesRequest(recording_id="r1", file_names=["a"])),
+    )
+    return [bytes([REQUESTS.index(name)]) + each.SerializeToString() for name, each in requests]
 
 
 def _drive_packets() -> bytes:

@@ -1,6 +1,7 @@
 """A short run over every parser, and the proof that a defect would be found."""
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -8,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import fuzz.__main__ as program
-from fuzz import OUTPUT
+from fuzz import OUTPUT, fleet
 from fuzz.worker import OURS
 
 ROOT = Path(__file__).parents[3]
@@ -49,6 +50,13 @@ def test_the_lines_of_every_package_that_a_target_imports_guide_the_fuzzer() -> 
         if isinstance(node, ast.ImportFrom) and node.module
     }
     assert imported & ours <= set(OURS)
+
+
+def test_the_receivers_store_in_memory_has_all_that_the_receiver_calls() -> None:
+    source = (ROOT / "hub/receiver/service.py").read_text()
+    called = set(re.findall(r"self\._store\.(\w+)", source))
+    assert "create" in called
+    assert called <= set(vars(vars(fleet)["_Store"]))
 
 
 def test_a_defect_is_found_and_can_be_tried_again(tmp_path: Path) -> None:
