@@ -1,4 +1,4 @@
-"""Fuzzes every parser of the project: `scripts/fuzz [--runs N] [--target NAME]`."""
+"""Fuzzes every parser of the project: `scripts/fuzz [--runs N] [--seed N] [--target NAME]`."""
 
 import argparse
 import re
@@ -74,7 +74,8 @@ def main() -> int:
     kept = Path(tempfile.mkdtemp(prefix="fuzz-"))
     table = Table("target", "inputs", "seconds", "peak MiB", "found")
     found = False
-    for name, outcome in _outcomes([arguments.target] if arguments.target else NAMES, arguments.runs, kept):
+    names = [arguments.target] if arguments.target else NAMES
+    for name, outcome in _outcomes(names, arguments.runs, arguments.seed, kept):
         found |= bool(outcome.defect)
         table.add_row(
             name,
@@ -89,14 +90,14 @@ def main() -> int:
     return int(found)
 
 
-def _outcomes(names: Sequence[str], runs: int, kept: Path) -> Iterator[tuple[str, Outcome]]:
+def _outcomes(names: Sequence[str], runs: int, seed: int, kept: Path) -> Iterator[tuple[str, Outcome]]:
     """Yields the outcome of each target, all of them at the end.
 
     Raises:
         subprocess.CalledProcessError: the worker itself failed.
     """
     worker = subprocess.run(
-        _worker(str(kept), str(runs), *names), stdout=subprocess.PIPE, text=True, check=True
+        _worker(str(kept), str(runs), str(seed), *names), stdout=subprocess.PIPE, text=True, check=True
     )
     for line in worker.stdout.splitlines():
         name, code, seconds = line.split()
@@ -125,6 +126,7 @@ def last_words(said: str) -> str:
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="scripts/fuzz", description=__doc__)
     parser.add_argument("--runs", type=int, default=_SHORT, help="inputs for each target (%(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="tries the same inputs again (by default others)")
     parser.add_argument("--target", choices=NAMES, help="this one only")
     parser.add_argument("--input", type=Path, help="try this one input again (with --target)")
     arguments = parser.parse_args()

@@ -1,8 +1,10 @@
 """Each target in a process of its own: libFuzzer ends it when it is done, or when it found something.
 
-python -m fuzz.worker DIRECTORY RUNS TARGET...  tries RUNS inputs of each; files in DIRECTORY/TARGET
-python -m fuzz.worker TARGET FILE               tries one input again
-python -m fuzz.worker --list                    names the targets
+python -m fuzz.worker DIRECTORY RUNS SEED TARGET...  tries RUNS inputs of each; files in DIRECTORY/TARGET
+python -m fuzz.worker TARGET FILE                    tries one input again
+python -m fuzz.worker --list                         names the targets
+
+The same SEED tries the same inputs; with 0 each run tries others.
 """
 
 import os
@@ -33,10 +35,11 @@ def main(arguments: list[str]) -> None:
     if arguments == ["--list"]:
         print(*TARGETS)
     elif arguments[1].isdecimal():
-        directory, runs, *names = arguments
+        directory, runs, seed, *names = arguments
+        options = [f"-runs={int(runs)}", f"-seed={int(seed)}"]
         for name in names:
             began_s = time.monotonic()
-            code = _in_a_copy(partial(_try, TARGETS[name], seeds.of(name), Path(directory) / name, int(runs)))
+            code = _in_a_copy(partial(_try, TARGETS[name], seeds.of(name), Path(directory) / name, options))
             print(name, code, time.monotonic() - began_s, flush=True)
     else:
         name, file = arguments
@@ -55,7 +58,7 @@ def _in_a_copy(work: Callable[[], None]) -> int:
     return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
 
 
-def _try(target: Callable[[bytes], None], good: Iterable[bytes], directory: Path, runs: int) -> None:
+def _try(target: Callable[[bytes], None], good: Iterable[bytes], directory: Path, options: list[str]) -> None:
     """Does not return; prints to a file in the directory."""
     corpus = directory / "corpus"
     corpus.mkdir(parents=True)
@@ -64,7 +67,7 @@ def _try(target: Callable[[bytes], None], good: Iterable[bytes], directory: Path
     with (directory / OUTPUT).open("wb") as output:
         for stream in (sys.stdout, sys.stderr):
             os.dup2(output.fileno(), stream.fileno())
-    _fuzz(target, [f"-runs={runs}", "-print_final_stats=1", f"-artifact_prefix={directory}/", str(corpus)])
+    _fuzz(target, [*options, "-print_final_stats=1", f"-artifact_prefix={directory}/", str(corpus)])
 
 
 def _fuzz(target: Callable[[bytes], None], options: list[str]) -> None:
