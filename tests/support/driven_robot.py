@@ -129,7 +129,8 @@ async def available(robot: DrivenRobot) -> AsyncIterator[AsyncGatewayClient]:
                     await client.reset_stop(teleop.stop.stop_id)
                 except GatewayError:
                     return False
-            return not teleop.holder and not teleop.stop
+            # The drive program's word: the gateway knows of the end of a session before it does.
+            return teleop.phase is DrivePhase.AVAILABLE and not teleop.holder and not teleop.stop
 
         await eventually(free, bool, "the robot is free")
         yield client
