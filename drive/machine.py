@@ -153,9 +153,15 @@ class State:
         """Whether the driver of a stream held when last heard of."""
         return bool(self.lease and self.lease.streaming and self.command and self.command.held)
 
+    def valid_command(self, now_ns: int) -> Command | None:
+        """Returns the newest command of the lease while it is valid; None before the first and after it."""
+        command = self.command
+        return command if command is not None and now_ns <= command.valid_until_ns else None
+
     def holding(self, now_ns: int) -> bool:
         """Whether the driver holds, by a command that is still valid."""
-        return self.command is not None and self.command.held and now_ns <= self.command.valid_until_ns
+        command = self.valid_command(now_ns)
+        return command is not None and command.held
 
     def heard(self, now_ns: int) -> bool:
         """Whether the driver of a stream is there: the newest command is still valid.
@@ -164,7 +170,7 @@ class State:
         without a stream outlives its only command.
         """
         streaming = self.lease is not None and self.lease.streaming
-        return streaming and self.command is not None and now_ns <= self.command.valid_until_ns
+        return streaming and self.valid_command(now_ns) is not None
 
     @property
     def expires_ns(self) -> int | None:
