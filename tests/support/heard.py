@@ -38,12 +38,12 @@ class Base:
     def stopped_after_s(self, since_s: float) -> float:
         """Returns how long after an instant zero has come that no motion followed.
 
-        0 if it was at rest and nothing has come since; infinite if it was told to move, then or since, and no
-        zero has followed. Silence is no stop: the base goes on.
+        0 if it was at rest and nothing has come since; infinite if the last velocity that it had received
+        then, or a later one, was motion, and no zero has followed. Silence is no stop: the base goes on.
         """
-        told = [each for each in self.heard if each.at_s < since_s][-1:]
-        told += [each for each in self.heard if each.at_s >= since_s]
-        moved_s = max((each.at_s for each in told if each.moves), default=None)
+        received = [each for each in self.heard if each.at_s < since_s][-1:]
+        received += [each for each in self.heard if each.at_s >= since_s]
+        moved_s = max((each.at_s for each in received if each.moves), default=None)
         from_s = since_s if moved_s is None else max(moved_s, since_s)
-        zeros_s = (each.at_s for each in told if not each.moves and each.at_s >= from_s)
+        zeros_s = (each.at_s for each in received if not each.moves and each.at_s >= from_s)
         return next(zeros_s, since_s if moved_s is None else math.inf) - since_s
