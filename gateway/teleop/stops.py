@@ -11,7 +11,7 @@ from common.reasons import Reason
 from common.token_bucket import TokenBucket
 from gateway.links.drive.commands import DriveCommands
 from gateway.links.drive.state import DriveLink
-from gateway.status.teleop import DrivePhase, DriveView, StopLatch
+from gateway.status.teleop import DriveActual, DrivePhase, DriveView, StopLatch
 
 CONFIRMED_WITHIN_S: Final = 1.0
 """How long the drive program may take to confirm a stop, a reset or a switch."""
@@ -99,10 +99,16 @@ class _Sent:
 
     def taken(self, view: DriveView) -> bool:
         """Returns whether the drive program has taken a stop since; no reset on its way has seen that one."""
-        actual = view.actual
-        if actual is None or not view.reachable or actual.monotonic_ns < self.at_ns:
+        actual = _report_since(view, self.at_ns)
+        if actual is None:
             return False
         return actual.counters.stops > (self.stops if actual.instance_id == self.instance_id else 0)
+
+
+def _report_since(view: DriveView, since_ns: int) -> DriveActual | None:
+    """Returns what a drive program that is reachable has reported since an instant; None without a report."""
+    actual = view.actual
+    return actual if view.reachable and actual and actual.monotonic_ns >= since_ns else None
 
 
 class Stops:
@@ -219,7 +225,7 @@ class Stops:
         self._pace.forget()
         sent = self._commands.reset(stop_id)
         if not sent or not await self._link.changes.wait_until(
-            lambda: self._has_reported(now_ns), CONFIRMED_WITHIN_S
+            lambda: _report_since(self._link.view, now_ns) is not None, CONFIRMED_WITHIN_S
         ):
             raise DriveUnreachableError(f"the robot's drive program does not answer: {HOW_TO_REACH}")
         view = self._link.view
@@ -232,8 +238,3 @@ class Stops:
         if newer:
             return f"stop {stop_id} is reset; the robot was stopped again by {newer.by}"
         return "the stop is reset; the driver has to release and to hold again"
-
-    def _has_reported(self, since_ns: int) -> bool:
-        """Whether the drive program has reported since an instant."""
-        view = self._link.view
-        return view.reachable and view.actual is not None and view.actual.monotonic_ns >= since_ns
