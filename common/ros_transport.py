@@ -1,10 +1,13 @@
 """How Fast DDS carries messages: over UDP where its shared memory does not do.
 
-Two reasons, both of Fast DDS 2.14. Its segments in /dev/shm are writable for their owner alone, and a reader
-has to write to those of a publisher: between nodes of two users nothing arrives, and no error says so. And it
+Three reasons, all of Fast DDS 2.14. Its segments in /dev/shm are writable for their owner alone, and a reader
+has to write to those of a publisher: between nodes of two users nothing arrives, and no error says so. It
 waits for up to a second for the port of a process that has just joined or ended
 (SharedMemGlobal::open_port_internal), and holds a lock meanwhile that each message of this process needs: a
-node that starts anywhere on the robot would stop a robot that is being driven.
+node that starts anywhere on the robot would stop a robot that is being driven. And the process that takes the
+place of one that was killed while it handled a message makes its port anew, while a publisher may go on
+filling the old one, which no check finds dead: the new process hears nothing of that publisher, however often
+it is started, until the publisher ends.
 """
 
 import os

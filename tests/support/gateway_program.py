@@ -66,5 +66,8 @@ def gateway_program(
         with grpc.insecure_channel(f"127.0.0.1:{port}", options) as channel:
             grpc.channel_ready_future(channel).result(timeout=_UP_WITHIN_S)
             yield GatewayProgram(process, port, RobotGatewayStub(channel))
+    except BaseException:
+        print((directory / "gateway.log").read_text(encoding="utf-8", errors="replace")[-4000:])
+        raise
     finally:
         end(process)

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from bench.video.foreign import end
+from common import ros_transport
 from simrobot.control import ask
 from tests.support.free import free_domain
 
@@ -19,7 +20,11 @@ _ROOT = Path(__file__).parents[2]
 
 @pytest.fixture
 def ros_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    """A domain of this test's own, in force for this process and its children; nothing leaves the machine."""
+    """A domain of this test's own, in force for this process and its children; nothing leaves the machine.
+
+    Our programs use UDP, as the containers and the systemd units have them do: through the shared memory a
+    gateway that takes the place of a killed one may hear nothing (`common.ros_transport`).
+    """
     with _own_domain(monkeypatch) as domain:
         yield domain
 
@@ -36,6 +41,7 @@ def _own_domain(patch: pytest.MonkeyPatch) -> Iterator[int]:
     with free_domain() as domain:
         patch.setenv("ROS_DOMAIN_ID", str(domain))
         patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        patch.setenv(ros_transport.VARIABLE, "udp")
         yield domain
 
 

@@ -11,6 +11,7 @@ import pytest
 from nav_msgs.msg import Odometry as OdometryMessage
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
+from common import ros_transport
 from gateway.config import DEFAULT_SOURCES
 from gateway.ros.intake import intake
 from gateway.status import sources as specs
@@ -124,8 +125,11 @@ def test_a_topic_every_five_seconds_keeps_its_value_between(tmp_path: Path) -> N
     assert second.at_s - first.at_s == pytest.approx(5, abs=0.5)
 
 
-def test_the_board_holds_what_an_ordinary_subscriber_saw_last(talker: Talker) -> None:
-    """Differential: the same messages through rclpy's own way and through ours."""
+def test_the_board_holds_what_an_ordinary_subscriber_saw_last(
+    talker: Talker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Differential: the same messages through rclpy's own way and through ours, by the same transport."""
+    monkeypatch.delenv(ros_transport.VARIABLE)
     board = Board()
     seen: list[OdometryMessage] = []
     with intake([ODOMETRY], board) as running:

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from common import ros_transport
 from console.client.blocking import GatewayClient
 from console.client.errors import Unreachable
 from tests.support.free import free_tcp_port
@@ -59,7 +60,10 @@ def test_the_gateway_hears_the_robots_nodes_whoever_they_run_as(
 def test_the_doctor_says_why_nodes_of_another_user_would_stay_silent(
     program: str,
     ros_domain: int,  # noqa: ARG001  # for its effect
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.delenv(ros_transport.VARIABLE)
+
     def finding(**environment: str) -> dict[str, str]:
         main = ("-c", f"from {program}.cli import main; main()", "doctor", "--json")
         with running_as(GATEWAY, home, *main, environment=environment) as process:
