@@ -118,6 +118,13 @@ class _Client(Client):
         self.farewell = ""
         """What the server said before it closed the connection; the library keeps the last error only."""
 
+    async def _process_op_err(self, e: Exception) -> None:
+        # What waits to be sent is lost with the connection. The library would try to send it when it closes,
+        # fail at that, and end half-way: without a word, with its tasks and its socket left behind.
+        self._pending.clear()
+        self._pending_data_size = 0
+        await super()._process_op_err(e)
+
     async def _process_pong(self) -> None:
         # A flush that timed out has left its cancelled future behind, and the library would complete it.
         if self._pongs and self._pongs[0].done():

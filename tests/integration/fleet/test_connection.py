@@ -3,7 +3,7 @@
 import asyncio
 import time
 from collections.abc import Iterator
-from contextlib import aclosing
+from contextlib import AsyncExitStack, aclosing, suppress
 from pathlib import Path
 
 import pytest
@@ -83,6 +83,30 @@ async def test_a_restart_of_the_server_is_survived(servers: NatsServers) -> None
             assert delivery.payload == b"do"
             await delivery.ack()
             assert await robot.request("fleet.r1.up.begin_file", b"again") == b"again"
+
+
+async def test_a_server_that_dies_while_something_is_being_sent_is_lost(servers: NatsServers) -> None:
+    async def talk(session: Session) -> None:
+        with suppress(UnreachableError):
+            while True:
+                await session.publish("quiet", b"x")
+                await asyncio.sleep(0)
+
+    async with AsyncExitStack() as stack:
+        sessions: list[Session] = []
+        for _ in range(8):
+            session = await Session.open(
+                servers.urls[0], credentials=None, ca=None, inbox="_INBOX.x", name=""
+            )
+            stack.push_async_callback(session.close)
+            sessions.append(session)
+        talking = [asyncio.create_task(talk(each)) for each in sessions]
+        await asyncio.sleep(0)
+        servers.kill(0)
+        lost = [asyncio.shield(each.lost) for each in sessions]
+        _, missed = await asyncio.wait(lost, timeout=5)
+        assert not missed, f"{len(missed)} of {len(sessions)} do not know that they are lost"
+        await asyncio.gather(*talking)
 
 
 @pytest.mark.timed
