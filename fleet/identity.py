@@ -153,13 +153,15 @@ class Account:
     revoked: Mapping[str, int] = field(default_factory=dict)
 
 
-def account_jwt(operator: Key, public: str, account: Account) -> str:
+def account_jwt(operator: Key, public: str, account: Account, issued_unix_s: int | None = None) -> str:
     """Returns an account's token.
 
     Args:
         operator: who signs.
         public: the account's public key.
         account: what the token says.
+        issued_unix_s: its time of issue, now by default. Of two tokens of an account, servers believe the one
+            that was issued later, and of two that were issued in the same second any.
     """
     names = ("subs", "data", "payload", "imports", "exports", "conn", "leaf")
     stored = ("mem_storage", "disk_storage", "streams", "consumer") if account.stores else ()
@@ -188,7 +190,7 @@ def account_jwt(operator: Key, public: str, account: Account) -> str:
         ],
         "revocations": dict(account.revoked),
     }
-    return _signed(operator, public, account.name, claims)
+    return _signed(operator, public, account.name, claims, issued_unix_s=issued_unix_s)
 
 
 def user_jwt(
@@ -206,7 +208,7 @@ def user_jwt(
     }
     if permissions.respond_s:
         claims["resp"] = {"max": _UNLIMITED, "ttl": permissions.respond_s * 1_000_000_000}
-    return _signed(account, user, name, claims, expires_unix_s)
+    return _signed(account, user, name, claims, expires_unix_s=expires_unix_s)
 
 
 def new_user(
@@ -218,10 +220,16 @@ def new_user(
 
 
 def _signed(
-    issuer: Key, subject: str, name: str, claims: Mapping[str, Any], expires_unix_s: int | None = None
+    issuer: Key,
+    subject: str,
+    name: str,
+    claims: Mapping[str, Any],
+    *,
+    expires_unix_s: int | None = None,
+    issued_unix_s: int | None = None,
 ) -> str:
     content: dict[str, Any] = {
-        "iat": int(time.time()),
+        "iat": int(time.time()) if issued_unix_s is None else issued_unix_s,
         "iss": issuer.public,
         "name": name,
         "sub": subject,

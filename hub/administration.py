@@ -92,6 +92,7 @@ def create(directory: HubDirectory, plan: HubPlan) -> None:
         system, _ = new_user(keys["system"], "administrator", _SYSTEM)
         seed = new_seed()
         root = directory.path
+        issued = _now_s()
         files = {
             **{root / "keys" / f"{name}.nk": key.seed for name, key in keys.items()},
             root / "keys" / "ca.pem": ca.certificate,
@@ -102,10 +103,10 @@ def create(directory: HubDirectory, plan: HubPlan) -> None:
             root / "receipts.pub": as_text([ReceiptSigner(seed).public_key]).encode(),
         }
         for node in plan.nodes:
-            files |= _node_files(root / "nodes" / node.name, node, plan, keys, ca)
+            files |= _node_files(root / "nodes" / node.name, node, plan, keys, ca, issued=issued)
         write_all_private(files)
         servers = tuple(f"tls://{node.host}:{node.port}" for node in plan.nodes)
-        directory.write(HubRecord(plan.fleet, servers, replicas=len(plan.nodes)))
+        directory.write(HubRecord(plan.fleet, servers, replicas=len(plan.nodes), issued=issued))
 
 
 async def apply(directory: HubDirectory, limits: streams.StreamLimits | None = None) -> list[str]:
@@ -117,8 +118,8 @@ async def apply(directory: HubDirectory, limits: streams.StreamLimits | None = N
     Raises:
         UserError: the hub can't be reached, or refuses.
     """
-    record = directory.read()
-    await _push_accounts(directory, record)
+    with directory.locked():
+        record = await _push_accounts(directory)
     async with _connected(directory) as hub:
         differences = await streams.set_up(hub, record.replicas, limits or streams.StreamLimits())
         for user in record.users:
@@ -159,7 +160,7 @@ async def enroll(
         )
         directory.write(record)
         if again:
-            await _push_accounts(directory, record)
+            await _push_accounts(directory)
 
 
 async def revoke(directory: HubDirectory, kind: Kind, name: str) -> None:
@@ -173,10 +174,10 @@ async def revoke(directory: HubDirectory, kind: Kind, name: str) -> None:
         user = record.user(kind, name)
         if user is None:
             raise UserError(f"the hub has no {kind} '{name}'", "List them: robot-bridge hub robots --all")
-        user = replace(user, revoked=int(time.time()))
+        user = replace(user, revoked=_now_s())
         record = _with_revoked(record.with_user(user), user.keys)
         directory.write(record)
-        await _push_accounts(directory, record)
+        await _push_accounts(directory)
         if kind == "robot":
             async with _connected(directory) as hub:
                 await _list_robot(hub, user)
@@ -189,7 +190,7 @@ async def push_revocations(directory: HubDirectory) -> None:
         UserError: the hub can't be reached, or refuses; `apply` repeats it.
     """
     with directory.locked():
-        await _push_accounts(directory, directory.read())
+        await _push_accounts(directory)
 
 
 def refresh_nodes(directory: HubDirectory) -> list[str]:
@@ -207,7 +208,7 @@ def refresh_nodes(directory: HubDirectory) -> list[str]:
     nodes = directory.path / "nodes"
     with directory.locked():
         record = directory.read()
-        tokens = _account_tokens(_keys(directory), record.fleet, record.revoked)
+        tokens = _account_tokens(_keys(directory), record.fleet, record.revoked, record.issued or _now_s())
         try:
             paths = sorted(each / "nats.conf" for each in nodes.iterdir())
         except FileNotFoundError:
@@ -351,7 +352,9 @@ def _keys(directory: HubDirectory) -> dict[KeyName, Key]:
     return {name: directory.key(name) for name in _KEYS}
 
 
-def _account_tokens(keys: Mapping[KeyName, Key], fleet: str, revoked: Mapping[str, int]) -> dict[str, str]:
+def _account_tokens(
+    keys: Mapping[KeyName, Key], fleet: str, revoked: Mapping[str, int], issued: int
+) -> dict[str, str]:
     """Returns the tokens of the three accounts, by public key."""
     services = permissions.SERVICES
     fleet_key = keys["fleet"].public
@@ -364,7 +367,8 @@ def _account_tokens(keys: Mapping[KeyName, Key], fleet: str, revoked: Mapping[st
     }
     named = {name: keys[name] for name in _ACCOUNTS}
     return {
-        key.public: account_jwt(keys["operator"], key.public, accounts[name]) for name, key in named.items()
+        key.public: account_jwt(keys["operator"], key.public, accounts[name], issued)
+        for name, key in named.items()
     }
 
 
@@ -372,7 +376,7 @@ _ACCOUNTS: Final[tuple[KeyName, ...]] = ("system", "fleet", "robots")
 
 
 def _node_files(
-    out: Path, node: Node, plan: HubPlan, keys: Mapping[KeyName, Key], ca: KeyPair
+    out: Path, node: Node, plan: HubPlan, keys: Mapping[KeyName, Key], ca: KeyPair, *, issued: int
 ) -> dict[Path, bytes]:
     certificate = issue_node_certificate(ca, node.name, [node.host, "localhost", "127.0.0.1"], _CA_DAYS)
     operator = keys["operator"]
@@ -381,7 +385,7 @@ def _node_files(
         plan.nodes,
         operator=operator_jwt(operator, f"{plan.fleet} hub", keys["system"].public),
         system_account=keys["system"].public,
-        accounts=_account_tokens(keys, plan.fleet, {}),
+        accounts=_account_tokens(keys, plan.fleet, {}, issued),
         places=plan.places,
         max_store=plan.max_store,
         sync_always=plan.sync_always,
@@ -420,13 +424,22 @@ def _issue(
 
 
 def _with_revoked(record: HubRecord, keys: Sequence[str]) -> HubRecord:
-    now_s = int(time.time())
-    return replace(record, revoked={**record.revoked, **dict.fromkeys(keys, now_s)})
+    return replace(record, revoked={**record.revoked, **dict.fromkeys(keys, _now_s())})
 
 
-async def _push_accounts(directory: HubDirectory, record: HubRecord) -> None:
-    """Gives the servers the accounts' tokens, with all revocations."""
-    tokens = _account_tokens(_keys(directory), record.fleet, record.revoked)
+def _now_s() -> int:
+    """Returns the time as tokens have it, in s since 1970."""
+    return int(time.time())
+
+
+async def _push_accounts(directory: HubDirectory) -> HubRecord:
+    """Gives the servers the accounts' tokens, with all revocations; returns what the directory says then."""
+    record = directory.read()
+    # Each later than the one before, also within a second, and after the clock was set back: a node that was
+    # down would otherwise bring the others its older tokens, and with them who has been revoked meanwhile.
+    record = replace(record, issued=max(_now_s(), record.issued + 1))
+    directory.write(record)
+    tokens = _account_tokens(_keys(directory), record.fleet, record.revoked, record.issued)
     async with _connected(directory, system=True) as hub:
         for token in tokens.values():
             answer = await hub.request("$SYS.REQ.CLAIMS.UPDATE", token.encode(), _PUSH_WITHIN_S)
@@ -436,6 +449,7 @@ async def _push_accounts(directory: HubDirectory, record: HubRecord) -> None:
                 raise HubError(HubReason.INVALID, "the server's answer to a token is no JSON") from wrong
             if error:
                 raise HubError(HubReason.INVALID, f"the server refuses an account's token: {error}")
+    return record
 
 
 async def _list_robot(hub: Hub, user: User) -> None:

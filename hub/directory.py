@@ -56,6 +56,7 @@ class HubRecord:
         replicas: nodes that keep each message.
         users: by kind and name.
         revoked: public keys that are not valid any more, with the time in s since 1970 up to which.
+        issued: when the newest tokens of the accounts were issued, in s since 1970.
     """
 
     fleet: str
@@ -63,6 +64,7 @@ class HubRecord:
     replicas: int
     users: tuple[User, ...] = ()
     revoked: Mapping[str, int] = field(default_factory=dict)
+    issued: int = 0
 
     def user(self, kind: Kind, name: str) -> User | None:
         """Returns the user of this kind and name, if there is one."""

@@ -23,6 +23,8 @@ from tests.support.waiting import wait_until
 _REVOKED_WITHIN_S = 5.0
 _LEARNED_WITHIN_S = 15.0
 """Both: docs/fleet.md. The second one is from a node's start, with the way back into the cluster."""
+_COMPARED_EVERY_S = 2.0
+"""hub/server_config.py: the resolver's interval."""
 _SERVERS = [
     pytest.param(SERVER, id="newest"),
     pytest.param(
@@ -102,6 +104,25 @@ def test_a_node_that_was_down_learns_of_it_from_the_others(cluster: SecureHub) -
     refused = partial(_answer, _at(cluster, robot, 2))
     wait_until(lambda: refused() is HubReason.REFUSED, "node 2 refuses it", _LEARNED_WITHIN_S)
     assert _admits(_at(cluster, other, 2))
+
+
+@pytest.mark.timed
+def test_a_node_that_was_down_brings_no_older_accounts(
+    cluster: SecureHub, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not even when the accounts had been given to it in the second of the revocation."""
+    robot, other = cluster.enroll("r1"), cluster.enroll("r2")
+    monkeypatch.setattr(administration, "_now_s", partial(int, time.time()))
+    assert asyncio.run(administration.apply(cluster.directory)) == []
+    cluster.servers.kill(2)
+    wait_until(lambda: _revoked(cluster, "r1"), "the robot is revoked", 30.0)
+    cluster.servers.start(2)
+    refused = partial(_answer, _at(cluster, robot, 2))
+    wait_until(lambda: refused() is HubReason.REFUSED, "node 2 refuses it", _LEARNED_WITHIN_S)
+    compared_s = time.monotonic() + 2 * _COMPARED_EVERY_S
+    while time.monotonic() < compared_s:
+        assert not any(_admits(_at(cluster, robot, node)) for node in range(3))
+    assert all(_admits(_at(cluster, other, node)) for node in range(3))
 
 
 def _at(hub: SecureHub, address: FleetAddress, node: int) -> FleetAddress:
