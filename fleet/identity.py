@@ -153,14 +153,14 @@ class Account:
     revoked: Mapping[str, int] = field(default_factory=dict)
 
 
-def account_jwt(operator: Key, public: str, account: Account, issued_unix_s: int | None = None) -> str:
+def account_jwt(operator: Key, public: str, account: Account, *, issued_unix_s: int) -> str:
     """Returns an account's token.
 
     Args:
         operator: who signs.
         public: the account's public key.
         account: what the token says.
-        issued_unix_s: its time of issue, now by default. Of two tokens of an account, servers believe the one
+        issued_unix_s: its time of issue. Of two tokens of an account, servers believe the one
             that was issued later, and of two that were issued in the same second any.
     """
     names = ("subs", "data", "payload", "imports", "exports", "conn", "leaf")

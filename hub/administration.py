@@ -119,7 +119,8 @@ async def apply(directory: HubDirectory, limits: streams.StreamLimits | None = N
         UserError: the hub can't be reached, or refuses.
     """
     with directory.locked():
-        record = await _push_accounts(directory)
+        record = directory.read()
+        await _push_accounts(directory, record)
     async with _connected(directory) as hub:
         differences = await streams.set_up(hub, record.replicas, limits or streams.StreamLimits())
         for user in record.users:
@@ -158,9 +159,10 @@ async def enroll(
                 out / "fleet.yaml": _fragment(record, f"robot: {robot}\n"),
             }
         )
-        directory.write(record)
         if again:
-            await _push_accounts(directory)
+            await _push_accounts(directory, record)
+        else:
+            directory.write(record)
 
 
 async def revoke(directory: HubDirectory, kind: Kind, name: str) -> None:
@@ -176,8 +178,7 @@ async def revoke(directory: HubDirectory, kind: Kind, name: str) -> None:
             raise UserError(f"the hub has no {kind} '{name}'", "List them: robot-bridge hub robots --all")
         user = replace(user, revoked=_now_s())
         record = _with_revoked(record.with_user(user), user.keys)
-        directory.write(record)
-        await _push_accounts(directory)
+        await _push_accounts(directory, record)
         if kind == "robot":
             async with _connected(directory) as hub:
                 await _list_robot(hub, user)
@@ -190,7 +191,7 @@ async def push_revocations(directory: HubDirectory) -> None:
         UserError: the hub can't be reached, or refuses; `apply` repeats it.
     """
     with directory.locked():
-        await _push_accounts(directory)
+        await _push_accounts(directory, directory.read())
 
 
 def refresh_nodes(directory: HubDirectory) -> list[str]:
@@ -367,7 +368,7 @@ def _account_tokens(
     }
     named = {name: keys[name] for name in _ACCOUNTS}
     return {
-        key.public: account_jwt(keys["operator"], key.public, accounts[name], issued)
+        key.public: account_jwt(keys["operator"], key.public, accounts[name], issued_unix_s=issued)
         for name, key in named.items()
     }
 
@@ -432,9 +433,8 @@ def _now_s() -> int:
     return int(time.time())
 
 
-async def _push_accounts(directory: HubDirectory) -> HubRecord:
-    """Gives the servers the accounts' tokens, with all revocations; returns what the directory says then."""
-    record = directory.read()
+async def _push_accounts(directory: HubDirectory, record: HubRecord) -> None:
+    """Keeps a record, and gives the servers the accounts' tokens, with all its revocations."""
     # Each later than the one before, also within a second, and after the clock was set back: a node that was
     # down would otherwise bring the others its older tokens, and with them who has been revoked meanwhile.
     record = replace(record, issued=max(_now_s(), record.issued + 1))
@@ -449,7 +449,6 @@ async def _push_accounts(directory: HubDirectory) -> HubRecord:
                 raise HubError(HubReason.INVALID, "the server's answer to a token is no JSON") from wrong
             if error:
                 raise HubError(HubReason.INVALID, f"the server refuses an account's token: {error}")
-    return record
 
 
 async def _list_robot(hub: Hub, user: User) -> None:

@@ -52,8 +52,10 @@ def test_an_operator_names_the_system_account() -> None:
 
 def test_only_an_account_that_stores_has_streams() -> None:
     operator = Key.new(KeyKind.OPERATOR)
-    with_streams = claims(account_jwt(operator, "AFLEET", Account("fleet", stores=True)), operator)
-    without = claims(account_jwt(operator, "AROBOTS", Account("robots")), operator)
+    with_streams = claims(
+        account_jwt(operator, "AFLEET", Account("fleet", stores=True), issued_unix_s=1), operator
+    )
+    without = claims(account_jwt(operator, "AROBOTS", Account("robots"), issued_unix_s=1), operator)
     assert "disk_storage" in with_streams["nats"]["limits"]
     assert "disk_storage" not in without["nats"]["limits"]
 
@@ -62,7 +64,7 @@ def test_an_account_has_its_services_and_revocations() -> None:
     operator = Key.new(KeyKind.OPERATOR)
     service = Service("fleet.*.up.*", many=True)
     account = Account("robots", imports=(("AFLEET", service),), revoked={"UROBOT": 7})
-    found = claims(account_jwt(operator, "AROBOTS", account), operator)["nats"]
+    found = claims(account_jwt(operator, "AROBOTS", account, issued_unix_s=1), operator)["nats"]
     assert found["revocations"] == {"UROBOT": 7}
     assert [(each["account"], each["subject"]) for each in found["imports"]] == [("AFLEET", "fleet.*.up.*")]
 
