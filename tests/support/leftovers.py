@@ -114,8 +114,11 @@ def _status(process: psutil.Process) -> str:
 def _threads() -> Iterator[str]:
     # Python's own: pools of foreign libraries keep idle threads, GLib's under the name of their last task.
     for thread in threading.enumerate():
+        # A foreign thread has an entry from its first log record on, which the collector of garbage can cause
+        # in any of them; before Python 3.13 the entry outlives the thread.
+        foreign = isinstance(thread, threading._DummyThread)
         # gRPC's asyncio side starts one with its first use in a process, and keeps it.
-        if "_poll_wrapper" not in thread.name:
+        if "_poll_wrapper" not in thread.name and not foreign:
             yield f"thread {thread.name}"
 
 

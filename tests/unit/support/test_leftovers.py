@@ -23,6 +23,8 @@ TIDY = {
     "child": "subprocess.run(['true'])",
     # Of the process, and kept as long as it lives.
     "ports": "from tests.support.free import free_tcp_port; free_tcp_port()",
+    # As a library's own thread does that logs something through Python, and ends.
+    "foreign_thread": "_thread.start_new_thread(log_something, ()); assert LOGGED.wait(5)",
 }
 SHARED = """
 @pytest.fixture(scope="session", autouse=True)
@@ -57,9 +59,14 @@ def run(pytester: pytest.Pytester, bodies: dict[str, str], more: str = "") -> py
     """Runs a module of one test for each body."""
     pytester.makeconftest("from tests.support import leftovers; leftovers.GONE_WITHIN_S = 0.5")
     helpers = """
-import os, socket, subprocess, threading
+import _thread, logging, os, socket, subprocess, threading
 import pytest
 KEPT = []
+LOGGED = threading.Event()
+
+def log_something():
+    logging.getLogger().error("something")
+    LOGGED.set()
 
 def bound(family, address):
     made = socket.socket(family, socket.SOCK_DGRAM)
