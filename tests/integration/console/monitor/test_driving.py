@@ -20,8 +20,6 @@ from tests.support.qt import keep_screenshot, let_pass, press, until
 from tests.support.robotctl import robotctl
 
 pytestmark = [pytest.mark.ros, pytest.mark.gst]
-STEADY = pytest.mark.timed
-"""For a base that still moves a moment later: where its driver is late by 250 ms, the robot stops."""
 
 BY_EYE = Supervision.LINE_OF_SIGHT
 BY_EYE_MPS = 0.15
@@ -116,7 +114,8 @@ def seat(robot: DrivenRobot) -> Iterator[Seat]:
     until(lambda: not robot.teleop.holder, "nor keeps it the robot")
 
 
-@STEADY
+# The base must still move a moment later: where its driver is late by 250 ms, the robot stops.
+@pytest.mark.timed
 def test_a_key_moves_the_robot_while_it_is_down(seat: Seat) -> None:
     seat.ready()
     seat.key(Qt.Key.Key_W, down=True)
@@ -173,7 +172,8 @@ def test_a_key_whose_meaning_has_changed_is_released(
     seat.rests()
 
 
-@STEADY
+# The base must still move a moment later: where its driver is late by 250 ms, the robot stops.
+@pytest.mark.timed
 def test_another_key_that_goes_up_releases_none(seat: Seat) -> None:
     seat.ready()
     target = QApplication.focusWidget() or seat.window
