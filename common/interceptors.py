@@ -5,12 +5,17 @@ four nested functions. Here an aspect is an `Interceptor` with hooks, and one `C
 four kinds:
 
     applies_to   once per method: whether the interceptor takes part in its calls
-    on_call      first to last, when a call arrives; refuses by raising
+    on_call      first to last, when the headers of a call arrive; refuses by raising
     on_request   first to last, for each message of the caller; may replace it, and refuses by raising
     (handler)
     on_response  last to first, for each message of the handler
     on_end       last to first, once, for those whose on_call returned
     on_error     after on_end, the same ones, if the call failed; what it raises is what the caller gets
+
+A call is judged by its headers: gRPC would not run the handler of a method with one request before that has
+arrived, so a caller that withholds it would keep a place that no interceptor knows of. The chain serves each
+method as one with a stream of requests, which makes no difference on the wire, and reads the one request
+itself, within a bound.
 
 What a call does not need must cost it next to nothing: a poll of the status takes 200 us on a desktop's core,
 and each coroutine or wrapper more would be paid some thousand times a second.
@@ -28,6 +33,7 @@ from google.protobuf.descriptor import ServiceDescriptor
 from google.protobuf.message import Message
 
 from common import request_id
+from common.errors import InvalidRequestError
 
 if TYPE_CHECKING:
     Handler: TypeAlias = grpc.RpcMethodHandler[Any, Any]
@@ -41,6 +47,9 @@ _log = logging.getLogger(__name__)
 _CANCELLATION_GRACE_S: Final = 0.1
 """When a caller leaves, gRPC ends the iterator of its requests as after the last one, or fails to write a
 response, and cancels the task afterwards, mostly within a millisecond."""
+REQUEST_WITHIN_S: Final = 10.0
+"""From the admission of a call to the last byte of its only request: the 256 KiB that a server accepts at
+most (common/rpc.py), at 210 kbit/s."""
 
 Behavior: TypeAlias = Callable[[Any, Any], Any]
 """A method of a servicer: one request, or an iterator of them, and the call; one response, or a generator."""
@@ -118,6 +127,7 @@ class Chain(grpc.aio.ServerInterceptor):
         interceptors: outermost first.
         method_type: describes a method by path, `request_streaming` and `response_streaming`.
         call_type: stands for one call; made of its method and gRPC's context.
+        request_within_s: how long a call that was admitted may withhold its only request.
 
     Attributes:
         interceptors: in their order.
@@ -128,10 +138,12 @@ class Chain(grpc.aio.ServerInterceptor):
         interceptors: Sequence[Interceptor[Any]],
         method_type: Callable[..., Any] = Method,
         call_type: Callable[[Any, RpcContext], Any] = Call,
+        request_within_s: float = REQUEST_WITHIN_S,
     ) -> None:
         self.interceptors: Final = tuple(interceptors)
         self._method_type = method_type
         self._call_type = call_type
+        self._request_within_s = request_within_s
         self._wrapped: dict[str, Handler] = {}
         """By path; a handler is wrapped once, not per call."""
 
@@ -192,15 +204,19 @@ class Chain(grpc.aio.ServerInterceptor):
             path, request_streaming=request_streaming, response_streaming=response_streaming
         )
         passage = _Passage([each for each in self.interceptors if each.applies_to(method)])
-        received = passage.each_received if request_streaming else passage.received
-        new_call = self._call_type
+        new_call, within_s = self._call_type, self._request_within_s
 
-        async def respond_once(request: Any, rpc: RpcContext) -> Any:
+        async def requested(call: Any, requests: AsyncIterable[Any]) -> Any:
+            if request_streaming:
+                return passage.each_received(call, requests)
+            return passage.received(call, await _only_request(call.rpc, within_s))
+
+        async def respond_once(requests: AsyncIterable[Any], rpc: RpcContext) -> Any:
             call = new_call(method, rpc)
             entered: list[Interceptor[Any]] = []
             try:
                 await passage.enter(call, entered)
-                response = passage.sent(call, await behavior(received(call, request), call))
+                response = passage.sent(call, await behavior(await requested(call, requests), call))
             except BaseException as error:
                 await passage.fail(call, entered, error)
                 raise
@@ -209,12 +225,12 @@ class Chain(grpc.aio.ServerInterceptor):
 
         # Writes the responses itself. From a generator gRPC would write them, and when the caller leaves it
         # cancels that write alone: the generator, and with it the end of the call, is left to the collector.
-        async def respond_often(request: Any, rpc: RpcContext) -> None:
+        async def respond_often(requests: AsyncIterable[Any], rpc: RpcContext) -> None:
             call = new_call(method, rpc)
             entered: list[Interceptor[Any]] = []
             try:
                 await passage.enter(call, entered)
-                async with aclosing(behavior(received(call, request), call)) as responses:
+                async with aclosing(behavior(await requested(call, requests), call)) as responses:
                     async for response in responses:
                         outgoing = passage.sent(call, response)
                         try:
@@ -228,8 +244,9 @@ class Chain(grpc.aio.ServerInterceptor):
                 raise
             passage.end(call, entered, None)
 
-        respond = respond_often if response_streaming else respond_once
-        return _KINDS[request_streaming, response_streaming](respond, deserializer, serializer)
+        if response_streaming:
+            return grpc.stream_stream_rpc_method_handler(respond_often, deserializer, serializer)
+        return grpc.stream_unary_rpc_method_handler(respond_once, deserializer, serializer)
 
 
 class _Passage:
@@ -280,13 +297,23 @@ class _Passage:
             await each.on_error(call, error)
 
 
-_KINDS: Final[Mapping[tuple[bool, bool], Callable[..., Handler]]] = {
-    (False, False): grpc.unary_unary_rpc_method_handler,
-    (False, True): grpc.unary_stream_rpc_method_handler,
-    (True, False): grpc.stream_unary_rpc_method_handler,
-    (True, True): grpc.stream_stream_rpc_method_handler,
-}
-"""By whether requests, and whether responses, are a stream."""
+async def _only_request(rpc: RpcContext, within_s: float) -> Any:
+    """Returns the request of a method that takes one.
+
+    Raises:
+        InvalidRequestError: there is none within `within_s`, or at all.
+    """
+    try:
+        async with asyncio.timeout(within_s):
+            request = await rpc.read()
+    except TimeoutError:
+        text = f"the call had no request within {within_s:g} s of its headers; send it with them"
+        raise InvalidRequestError(text) from None
+    if request is grpc.aio.EOF:
+        # Raises CancelledError if the caller has left.
+        await asyncio.sleep(_CANCELLATION_GRACE_S)
+        raise InvalidRequestError("the call ended without a request; this method takes one")
+    return request
 
 
 def _behavior_of(handler: Handler) -> Behavior:

@@ -23,9 +23,10 @@ _SERVER_OPTIONS: Final = (
     # Per connection (SETTINGS_MAX_CONCURRENT_STREAMS, RFC 9113 6.5.2): what one client can have handled at
     # once, before those of others.
     ("grpc.max_concurrent_streams", 256),
-    # Calls of all connections that wait for a handler; gRPC cancels any more, of any caller.
-    ("grpc.server.max_pending_requests", 4096),
-    ("grpc.server.max_pending_requests_hard_limit", 8192),
+    # Calls of all connections that wait for a handler; gRPC cancels any more, of any caller. Each takes some
+    # 20 KiB and 0.1 ms, so a long queue costs memory, and the others more time, than a short one saves calls.
+    ("grpc.server.max_pending_requests", 1024),
+    ("grpc.server.max_pending_requests_hard_limit", 2048),
     # From the connection to the HTTP/2 preface.
     ("grpc.server_handshake_timeout_ms", 5_000),
     # A peer that vanished is noticed after 5 + 3 s.

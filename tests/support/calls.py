@@ -19,12 +19,16 @@ PEER = "ipv4:10.0.0.5:41234"
 class RpcDouble:
     """gRPC's context, as far as interceptors look at it."""
 
-    def __init__(self, peer: str, token: str | None) -> None:
+    def __init__(self, peer: str, token: str | None, request: Any = b"") -> None:
         self._peer = peer
         self._token = token
+        self._request = request
         self.aborted_with: grpc.StatusCode | None = None
         self.written: list[Any] = []
         """The responses of a stream."""
+
+    async def read(self) -> Any:
+        return self._request
 
     async def write(self, response: Any) -> None:
         self.written.append(response)
@@ -79,8 +83,8 @@ async def serve(
     handlers: Any = chain.service(CONTRACT, {method: behavior})
     details: Any = SimpleNamespace(method=f"/{CONTRACT.full_name}/{method}")
     handler: Any = handlers.service(details)
-    rpc = RpcDouble(peer, token)
+    rpc = RpcDouble(peer, token, request)
     if handler.response_streaming:
-        await handler.unary_stream(request, rpc)
+        await handler.stream_stream(None, rpc)
         return rpc.written
-    return await handler.unary_unary(request, rpc)
+    return await handler.stream_unary(None, rpc)

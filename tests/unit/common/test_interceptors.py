@@ -4,6 +4,7 @@ import asyncio
 import gc
 import logging
 from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager
 from types import SimpleNamespace
 from typing import Any
 
@@ -184,6 +185,9 @@ async def test_a_caller_that_leaves_while_a_response_is_on_its_way_ends_the_hand
 
 async def test_a_response_that_can_not_be_written_is_a_caller_that_has_left() -> None:
     class Gone:
+        async def read(self) -> bytes:
+            return b"q"
+
         async def write(self, _response: bytes) -> None:
             raise grpc.aio.InternalError("Failed grpc_call_start_batch")
 
@@ -200,9 +204,9 @@ async def test_a_response_that_can_not_be_written_is_a_caller_that_has_left() ->
 
     handler = await chain.intercept_service(found, details)
     assert handler is not None
-    respond: Any = handler.unary_stream
+    respond: Any = handler.stream_stream
     with pytest.raises(asyncio.CancelledError):
-        await respond(b"q", Gone())
+        await respond(None, Gone())
     assert steps == ["a call", "a q", "a response", "a end CancelledError"]
 
 
@@ -230,6 +234,66 @@ async def test_a_hook_that_fails_at_the_end_keeps_no_other_from_ending(
         assert await called(chain, kind, b"q") == [b"response"]
     assert steps[-1] == "a end"
     assert "Failing.on_end failed" in caplog.text
+
+
+@asynccontextmanager
+async def withholding(chain: Chain, kind: str) -> AsyncIterator[Any]:
+    """A call of a method with one request of which nothing but the headers has been sent."""
+    make, _ = KINDS[kind]
+    server = new_server(chain)
+    handlers: dict[str, grpc.RpcMethodHandler[Any, Any]] = {kind: make(BEHAVIORS[kind])}
+    server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("test.Service", handlers),))
+    port = server.add_insecure_port("127.0.0.1:0")
+    await server.start()
+    try:
+        async with grpc.aio.insecure_channel(f"127.0.0.1:{port}") as channel:
+            method: Any = channel.stream_unary if kind == "Unary" else channel.stream_stream
+            yield method(f"/test.Service/{kind}")()
+    finally:
+        await server.stop(None)
+
+
+@pytest.mark.parametrize("kind", ["Unary", "Responses"])
+async def test_a_call_is_refused_by_its_headers(kind: str) -> None:
+    async with withholding(Chain([ErrorInterceptor(), Refusing()]), kind) as call:
+        assert await asyncio.wait_for(call.code(), 5) is grpc.StatusCode.INVALID_ARGUMENT
+        assert "not like this" in await call.details()
+
+
+@pytest.mark.parametrize("kind", ["Unary", "Responses"])
+async def test_a_request_that_does_not_come_ends_its_call(kind: str) -> None:
+    steps: list[str] = []
+    chain = Chain([ErrorInterceptor(), Recorder("a", steps)], request_within_s=0.2)
+    async with withholding(chain, kind) as call:
+        assert await asyncio.wait_for(call.code(), 5) is grpc.StatusCode.INVALID_ARGUMENT
+        assert "no request within 0.2 s" in await call.details()
+    assert steps == ["a call", "a end InvalidRequestError"]
+
+
+@pytest.mark.parametrize("kind", ["Unary", "Responses"])
+async def test_a_call_that_ends_without_its_request_is_refused(kind: str) -> None:
+    async with withholding(Chain([ErrorInterceptor()]), kind) as call:
+        await call.done_writing()
+        assert await asyncio.wait_for(call.code(), 5) is grpc.StatusCode.INVALID_ARGUMENT
+        assert "ended without a request" in await call.details()
+
+
+async def test_a_caller_that_leaves_before_its_request_has_made_none() -> None:
+    ended: asyncio.Future[BaseException | None] = asyncio.get_running_loop().create_future()
+    arrived = asyncio.Event()
+
+    class Ending(Interceptor[Call]):
+        def on_call(self, _call: Call) -> None:
+            arrived.set()
+
+        def on_end(self, _call: Call, error: BaseException | None) -> None:
+            ended.set_result(error)
+
+    async with withholding(Chain([ErrorInterceptor(), Ending()]), "Unary") as call:
+        await asyncio.wait_for(arrived.wait(), 5)
+        call.cancel()
+        error = await asyncio.wait_for(ended, 5)
+    assert isinstance(error, asyncio.CancelledError), repr(error)
 
 
 class NotForThis(Recorder):
