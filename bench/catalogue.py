@@ -176,8 +176,16 @@ PARTS: Final = (
             "siege.closed",
         ),
     ),
-    Part("bench.soak", 31, ("soak.rss_growth_mib", "soak.fds_growth")),
-    Part("bench.soak", 31, ("soak.gateway_rss_growth_mib", "soak.gateway_fds_growth")),
+    Part("bench.soak.programs", 31, ("soak.rss_growth_mib", "soak.fds_growth")),
+    Part("bench.soak.programs", 31, ("soak.gateway_rss_growth_mib", "soak.gateway_fds_growth")),
+    Part(
+        "bench.soak.robot",
+        122,
+        tuple(
+            f"soak.robot_{figure}"
+            for figure in ("rss_growth_mib", "fds_growth", "threads_growth", "log_growth", "failed_rounds")
+        ),
+    ),
 )
 
 ON_REQUEST: Final = ("drive", "rec", "export", "fleet", "siege", "soak")

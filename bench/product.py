@@ -57,15 +57,22 @@ def product(
         ros = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
         stack.enter_context(patch.dict(os.environ, ros))
         stack.enter_context(simulated_robot(directory))
-        service = stack.enter_context(_program("robot-preview", directory, preview_settings))
-        server = stack.enter_context(_program("robot-gateway", directory, gateway_settings))
+        service = stack.enter_context(serving("robot-preview", directory, preview_settings))
+        server = stack.enter_context(serving("robot-gateway", directory, gateway_settings))
         client = stack.enter_context(GatewayClient(target, credentials=credentials))
         _wait_until_received(client)
         yield Product(server, service, target, client)
 
 
 @contextmanager
-def _program(name: str, directory: Path, settings: object) -> Iterator[subprocess.Popen[bytes]]:
+def serving(name: str, directory: Path, settings: object) -> Iterator[subprocess.Popen[bytes]]:
+    """Runs an installed program until the block ends; its log is NAME.log.
+
+    Args:
+        name: of the program.
+        directory: for its configuration and log.
+        settings: of its configuration.
+    """
     file = directory / f"{name}.yaml"
     file.write_text(json.dumps(settings), encoding="utf-8")  # JSON is YAML
     with (directory / f"{name}.log").open("wb") as log:

@@ -4,6 +4,7 @@ GStreamer's srtsrc has no switch for that, so this loads, through ctypes, the ve
 Names and layouts are those of libsrt's srt.h; the C ABI is the same in all 1.x versions from 1.4.2 on.
 """
 
+import atexit
 import ctypes
 import os
 import select
@@ -106,9 +107,12 @@ def load() -> Any:
         raise LibsrtMissingError(f"libsrt is too old: {error}") from error
     if version < _OLDEST_VERSION:
         raise LibsrtMissingError(f"libsrt {_dotted(version)} is older than {_dotted(_OLDEST_VERSION)}")
-    # Counted: GStreamer's elements start and clean up for themselves. Ours lasts as long as the process.
+    # Counted: GStreamer's elements start and clean up for themselves. Ours lasts as long as the process, but
+    # no longer: libsrt's destructor takes back one start only, and frees the tables that its threads go on
+    # using if there were more.
     if library.srt_startup() == _ERROR:
         raise LibsrtMissingError("libsrt can't be started")
+    atexit.register(library.srt_cleanup)
     return library
 
 
@@ -245,6 +249,7 @@ class SrtSocket:
 
 _SIGNATURES: Final[dict[str, list[Any]]] = {
     "srt_startup": [],
+    "srt_cleanup": [],
     "srt_create_socket": [],
     "srt_bind_acquire": [ctypes.c_int, ctypes.c_int],
     "srt_connect": [ctypes.c_int, ctypes.c_char_p, ctypes.c_int],

@@ -157,7 +157,7 @@ def test_h265_in_software_from_end_to_end(tmp_path: Path) -> None:
 
 
 def test_again_and_again_leaves_nothing_behind(preview: RunningPreview) -> None:
-    """The short form of the soak (bench/soak.py)."""
+    """The short form of the soak (bench/soak/programs.py)."""
     memory_mib: list[float] = []
 
     def one_round() -> None:

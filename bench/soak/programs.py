@@ -1,8 +1,8 @@
 """Half an hour of the preview service, and half an hour of the gateway: what they keep of what has ended.
 
-Not part of a run without names: `scripts/bench soak`. A round of the preview service is enable, join, switch,
-leave and disable. libsrt keeps closed sockets and their buffers for some seconds, and several rounds pass in
-each of these. A round of the gateway is operators who come, read, watch, subscribe and go.
+A round of the preview service is enable, join, switch, leave and disable. libsrt keeps closed sockets and
+their buffers for some seconds, and several rounds pass in each of these. A round of the gateway is operators
+who come, read, watch, subscribe and go.
 """
 
 import tempfile
@@ -15,7 +15,7 @@ from typing import Final
 from bench.product import product
 from bench.progress import log
 from bench.rows import Row
-from bench.soak_readings import FEWEST_ROUNDS, Reading, judge
+from bench.soak.readings import FEWEST_ROUNDS, Reading, judge
 from bench.video import product as sender
 from bench.video.camera import camera
 from bench.video.viewing import PATIENCE_S
@@ -28,13 +28,13 @@ _LOG_EVERY_ROUNDS: Final = 25
 _PROFILES: Final = (PreviewProfile.LOW_BW, PreviewProfile.BALANCED, PreviewProfile.HIGH_QUALITY)
 
 
-def run(names: list[str], minutes: float = MINUTES) -> list[Row]:
-    rows: list[Row] = []
-    if not names or {"soak.rss_growth_mib", "soak.fds_growth"} & set(names):
-        rows += _preview(minutes)
-    if not names or {"soak.gateway_rss_growth_mib", "soak.gateway_fds_growth"} & set(names):
-        rows += _gateway(minutes)
-    return [row for row in rows if not names or row.name in names]
+def rows(_ground: None, wanted: set[str], minutes: float = MINUTES) -> list[Row]:
+    found: list[Row] = []
+    if {"soak.rss_growth_mib", "soak.fds_growth"} & wanted:
+        found += _preview(minutes)
+    if {"soak.gateway_rss_growth_mib", "soak.gateway_fds_growth"} & wanted:
+        found += _gateway(minutes)
+    return found
 
 
 def _preview(minutes: float) -> list[Row]:

@@ -1,0 +1,162 @@
+"""A whole robot in one ROS domain, with all of its programs, and its fleet's hub."""
+
+import asyncio
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+from unittest.mock import patch
+
+import psutil
+
+from bench.product import serving
+from bench.soak.readings import Reading
+from common.ros_transport import VARIABLE
+from console.client import CloudState, GatewayClient, RecorderState
+from console.receiver.address import StreamAddress
+from simrobot.control import ask
+from tests.support.driven_robot import TELEOP, driven_base
+from tests.support.free import free_domain, free_tcp_port, free_udp_port
+from tests.support.heard import Base
+from tests.support.nats_servers import NatsServers, nats_servers
+from tests.support.running_bridge import bridge_program, prepare
+from tests.support.running_drive import RunningDrive
+from tests.support.running_recorder import recorder_program
+from tests.support.waiting import wait_until
+
+LATENCY_MS: Final = 20
+STEADY, PASSING = "steady", "passing"
+"""Cameras: one that stays, and one that ends every few seconds, as if it were unplugged."""
+_PASSING_FRAMES: Final = 90
+_UP_WITHIN_S: Final = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Deployment:
+    """All of it, running.
+
+    Attributes:
+        directory: for files of the rounds.
+        target: the gateway's address.
+        base: what the drive program moves.
+        hub: of the fleet; one server.
+        stream: where the preview's viewers connect while it is on.
+    """
+
+    directory: Path
+    target: str
+    base: Base
+    hub: NatsServers
+    stream: StreamAddress
+    _processes: Mapping[str, int]
+    _drive: RunningDrive
+    _control: Path
+    _logs: Mapping[str, Path]
+
+    def change_sensors(self, **fields: Any) -> None:
+        """Changes the behaviour of the simulated robot."""
+        ask(self._control, fields)
+
+    def readings(self) -> dict[str, Reading]:
+        """Returns what each program has now, by its name."""
+        (worker,) = psutil.Process(self._drive.process.pid).children()
+        processes = {**self._processes, "robot-drive's worker": worker.pid}
+        return {name: Reading.of(pid, self._logs.get(name)) for name, pid in processes.items()}
+
+
+@contextmanager
+def deployment() -> Iterator[Deployment]:
+    """Runs all programs until the block ends; each serves when it begins."""
+    with ExitStack() as stack:
+        directory = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        domain = stack.enter_context(free_domain())
+        environment = {
+            "ROS_DOMAIN_ID": str(domain),
+            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+            VARIABLE: "udp",  # as the containers have it
+        }
+        stack.enter_context(patch.dict(os.environ, environment))
+        base, drive = stack.enter_context(driven_base(directory))
+        tap, udp, tcp = str(directory / "tap.sock"), free_udp_port(), free_tcp_port()
+        preview = stack.enter_context(
+            serving("robot-preview", directory, _preview_settings(directory, udp, tap))
+        )
+        recorder = stack.enter_context(recorder_program(directory, video={"socket": tap}))
+        hub = stack.enter_context(nats_servers(directory / "hub"))
+        asyncio.run(prepare(hub.urls))
+        bridge = stack.enter_context(bridge_program(directory, tcp, hub.urls))
+        settings = {
+            "grpc": {"port": tcp},
+            "preview": {"socket": str(directory / "preview.sock"), "encrypted": False},
+            "teleop": {"socket": str(drive.socket), **TELEOP},
+            "recording": {"socket": str(recorder.socket)},
+            "bridge": {"socket": str(bridge.socket)},
+        }
+        gateway = stack.enter_context(serving("robot-gateway", directory, settings))
+        bridge.start()
+        assert recorder.process
+        assert bridge.process
+        programs = {
+            "robot-gateway": gateway,
+            "robot-preview": preview,
+            "robot-drive": drive.process,
+            "robot-recorder": recorder.process,
+            "robot-bridge": bridge.process,
+        }
+        logs = {
+            "robot-gateway": directory / "robot-gateway.log",
+            "robot-preview": directory / "robot-preview.log",
+            "robot-drive": drive.log,
+            "robot-recorder": recorder.log,
+            "robot-bridge": bridge.log,
+        }
+        made = Deployment(
+            directory,
+            f"127.0.0.1:{tcp}",
+            base,
+            hub,
+            StreamAddress("127.0.0.1", udp, LATENCY_MS),
+            {name: process.pid for name, process in programs.items()},
+            drive,
+            directory / "robot.sock",
+            logs,
+        )
+        _wait_until_whole(made)
+        yield made
+
+
+def _preview_settings(directory: Path, port: int, tap: str) -> dict[str, Any]:
+    # One frame after the other, then the end of the stream.
+    passing = f"videotestsrc is-live=true num-buffers={_PASSING_FRAMES} ! video/x-raw,width=640,height=360"
+    return {
+        "socket": str(directory / "preview.sock"),
+        "cameras": {
+            STEADY: {"kind": "test"},
+            PASSING: {"kind": "gst", "description": passing, "fallback": STEADY},
+        },
+        "srt": {"bind": "127.0.0.1", "port": port, "latency_ms": LATENCY_MS},
+        "encoders": {"order": ["x264"]},
+        "video_tap": {"socket": tap},
+        "runtime_dir": str(directory / "preview-run"),
+    }
+
+
+def _wait_until_whole(made: Deployment) -> None:
+    with GatewayClient(made.target) as client:
+
+        def is_whole() -> bool:
+            status = client.status()
+            return bool(
+                status.preview.service_reachable
+                and status.odometry.available
+                and status.teleop.enabled
+                and status.recording
+                and status.recording.state is RecorderState.IDLE
+                and status.cloud
+                and status.cloud.state is CloudState.CONNECTED
+            )
+
+        wait_until(is_whole, "every program of the robot serves", _UP_WITHIN_S)

@@ -1,0 +1,171 @@
+"""Two hours of a whole robot, with operators, viewers, drivers, recordings and faults that come and go.
+
+A round is what several people do with a robot in some seconds, beside one fault; the faults take turns. What
+a program keeps of what has ended adds up (readings.py). A round in which an operator does not get what was
+asked for counts as failed, and its reason is logged.
+"""
+
+import asyncio
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from itertools import cycle
+from typing import Final
+
+from bench.progress import log
+from bench.rows import Row
+from bench.soak.deployment import PASSING, STEADY, Deployment, deployment
+from bench.soak.readings import FEWEST_ROUNDS, Reading, judge_together
+from console.client import AsyncGatewayClient, GatewayClient, GatewayError, PreviewProfile, PreviewState
+from console.receiver.errors import StreamError
+from tests.support.driven_robot import BY_EYE, in_motion, is_at_rest
+from tests.support.eventually import eventually
+from tests.support.hostile import CONVERSATIONS, converse
+from tests.support.receiver import Receiver
+from tests.support.waiting import wait_until
+
+MINUTES: Final = 120.0
+OPERATORS: Final = 3
+SPEED_MPS: Final = 0.1
+FRAME_WITHIN_S: Final = 10.0
+FAULT_WITHIN_S: Final = 15.0
+_PROFILES: Final = (PreviewProfile.LOW_BW, PreviewProfile.BALANCED, PreviewProfile.HIGH_QUALITY)
+_LOG_EVERY_ROUNDS: Final = 20
+_SILENT: Final = "battery"
+
+
+def rows(_ground: None, wanted: set[str], minutes: float = MINUTES) -> list[Row]:
+    readings: list[dict[str, Reading]] = []
+    failed_rounds = 0
+    with deployment() as robot:
+        until_s = time.monotonic() + minutes * 60
+        for profile, fault in zip(cycle(_PROFILES), cycle(FAULTS)):
+            try:
+                one_round(robot, profile, fault)
+            except (GatewayError, StreamError, AssertionError, TimeoutError) as error:
+                failed_rounds += 1
+                what = f"{type(error).__name__}: {error}"
+                log(f"soak.robot: round {len(readings) + 1}, {fault.__name__}: {what}")
+            readings.append(robot.readings())
+            if len(readings) % _LOG_EVERY_ROUNDS == 0:
+                _log(len(readings), readings[-1])
+            if time.monotonic() >= until_s and len(readings) >= FEWEST_ROUNDS:
+                break
+    rounds = f"operators, a viewer, a driver, a recording and a fault in {minutes:g} min"
+    made = judge_together(readings, failed_rounds, "soak.robot_", rounds)
+    return [row for row in made if row.name in wanted]
+
+
+def one_round(robot: Deployment, profile: PreviewProfile, fault: "Fault") -> None:
+    """What people do with a robot, beside a fault.
+
+    Raises:
+        GatewayError: of what an operator called.
+        StreamError: a viewer got no frame.
+        AssertionError: something that had to happen did not.
+    """
+    with GatewayClient(robot.target) as client, fault(robot, client):
+        _come_and_go(robot.target)
+        _watch(robot, client, profile)
+        asyncio.run(_drive_and_record(robot))
+
+
+def _come_and_go(target: str) -> None:
+    """Each operator has a connection, and leaves two streams in the middle."""
+    for _ in range(OPERATORS):
+        with GatewayClient(target) as client:
+            client.status()
+            client.overlay()
+            next(client.watch_status(0.1))
+            next(client.events())
+
+
+def _watch(robot: Deployment, client: GatewayClient, profile: PreviewProfile) -> None:
+    """One viewer stays while the camera changes to one that ends by itself."""
+    change = client.enable_preview(profile, camera=STEADY)
+    assert change.preview.state is PreviewState.RUNNING, change.message
+    try:
+        with Receiver(robot.stream) as staying:
+            staying.next_frame(FRAME_WITHIN_S)
+            client.enable_preview(camera=PASSING)
+            with Receiver(robot.stream) as passing:
+                passing.next_frame(FRAME_WITHIN_S)
+            staying.next_frame(FRAME_WITHIN_S)
+    finally:
+        client.disable_preview()
+
+
+async def _drive_and_record(robot: Deployment) -> None:
+    """A driver moves the robot for a moment while it is recorded; the recording is fetched and deleted."""
+    async with AsyncGatewayClient(robot.target) as client:
+        made = (await client.start_recording("soak")).recording
+        async with client.drive(BY_EYE) as session:
+            await in_motion(session, robot.base, SPEED_MPS)
+            session.release()
+            await eventually(lambda: is_at_rest(robot.base), bool, "the base is at rest")
+        await client.stop_recording(made.id)
+        folder = robot.directory / "exported"
+        await client.export_recording(made.id, folder)
+        shutil.rmtree(folder)
+        await client.delete_recording(made.id)
+
+
+Fault = Callable[[Deployment, GatewayClient], AbstractContextManager[None]]
+"""There while the block lasts."""
+
+
+@contextmanager
+def no_fault(_robot: Deployment, _client: GatewayClient) -> Iterator[None]:
+    """Nothing is wrong."""
+    yield
+
+
+@contextmanager
+def silent_sensor(robot: Deployment, client: GatewayClient) -> Iterator[None]:
+    """A topic has no messages; the fault is there before the block ends, and gone after."""
+    robot.change_sensors(silent=[_SILENT])
+    try:
+        yield
+        _wait_for_fault(client, active=True)
+    finally:
+        robot.change_sensors(silent=[])
+    _wait_for_fault(client, active=False)
+
+
+@contextmanager
+def lost_hub(robot: Deployment, _client: GatewayClient) -> Iterator[None]:
+    """The fleet's hub dies, and is started again."""
+    robot.hub.kill(0)
+    try:
+        yield
+    finally:
+        robot.hub.start_all()
+
+
+@contextmanager
+def bad_callers(robot: Deployment, _client: GatewayClient) -> Iterator[None]:
+    """Strangers send what no client would."""
+    port = int(robot.target.rpartition(":")[2])
+    for said in CONVERSATIONS.values():
+        converse(port, said)
+    yield
+
+
+FAULTS: Final = (no_fault, silent_sensor, lost_hub, bad_callers)
+
+
+def _wait_for_fault(client: GatewayClient, *, active: bool) -> None:
+    wait_until(
+        lambda: any(_SILENT in each.id and each.active for each in client.status().faults) is active,
+        f"the fault of the {_SILENT} is {'there' if active else 'gone'}",
+        FAULT_WITHIN_S,
+    )
+
+
+def _log(rounds: int, newest: dict[str, Reading]) -> None:
+    figures = "; ".join(
+        f"{name} {r.resident_mib:.1f} MiB, {r.descriptors} descriptors, {r.threads} threads"
+        for name, r in newest.items()
+    )
+    log(f"soak.robot: round {rounds}: {figures}")
