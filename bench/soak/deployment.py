@@ -15,7 +15,8 @@ import psutil
 from bench.product import serving
 from bench.soak.readings import Reading
 from common.ros_transport import VARIABLE
-from console.client import CloudState, GatewayClient, RecorderState
+from console.client import CloudState, GatewayClient
+from console.client.results import RecorderState
 from console.receiver.address import StreamAddress
 from simrobot.control import ask
 from tests.support.driven_robot import TELEOP, driven_base

@@ -32,8 +32,8 @@ class Reading:
     @classmethod
     def of(cls, pid: int, log: Path | None = None) -> Self:
         """Reads a process, and the size of its log."""
-        entries = (len(list(Path(f"/proc/{pid}/{each}").iterdir())) for each in ("fd", "task"))
-        return cls(resident_mib(pid), *entries, log.stat().st_size if log else 0)
+        descriptors, threads = (len(list(Path(f"/proc/{pid}/{each}").iterdir())) for each in ("fd", "task"))
+        return cls(resident_mib(pid), descriptors, threads, log.stat().st_size if log else 0)
 
 
 @dataclass(frozen=True, slots=True)
