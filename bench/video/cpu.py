@@ -58,7 +58,10 @@ def rows(workdir: Path, wanted: set[str]) -> list[Row]:
         "video.cpu": (_at_once, "at once"),
         "video.cpu_in_turns": (_in_turns, "in turns"),
     }
-    with camera(workdir) as source, product.robot(workdir, source, LATENCY_MS) as robot:
+    with (
+        camera(workdir) as source,
+        product.robot(workdir, source, LATENCY_MS, settings=product.FIXED_RATE) as robot,
+    ):
         return [_row(name, *way, source, robot) for name, way in ways.items() if name in wanted]
 
 

@@ -73,7 +73,10 @@ class Outcome:
 
 def rows(workdir: Path, wanted: set[str]) -> list[Row]:
     outcomes = {cell: list[Outcome]() for cell in CELLS if any(row.startswith(cell.name) for row in wanted)}
-    with camera(workdir) as source, product.robot(workdir, source, LATENCY_MS) as robot:
+    with (
+        camera(workdir) as source,
+        product.robot(workdir, source, LATENCY_MS, settings=product.FIXED_RATE) as robot,
+    ):
         for _ in range(ROUNDS):
             for cell, found in outcomes.items():
                 found.append(measure(cell, source, robot))

@@ -42,7 +42,10 @@ class Seen:
 def rows(workdir: Path, wanted: set[str]) -> list[Row]:
     peers = {name: peer for name, peer in PEERS.items() if any(row.startswith(name) for row in wanted)}
     seen: dict[str, list[Seen]] = {name: [] for name in peers}
-    with camera(workdir) as source, product.robot(workdir, source, LATENCY_MS) as robot:
+    with (
+        camera(workdir) as source,
+        product.robot(workdir, source, LATENCY_MS, settings=product.FIXED_RATE) as robot,
+    ):
         for _ in range(ROUNDS):
             for name in peers:
                 seen[name].append(one_round(name, source, robot))

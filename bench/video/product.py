@@ -60,6 +60,11 @@ class Service:
         return foreign.spawn(*self._command, own=True, more=self._environment)
 
 
+FIXED_RATE: Final = {"adaptive": {"enabled": False}}
+"""Settings for rows in which the reference sends at the profile's bit rate from the first frame on: the
+adaptive one starts low with the first viewer, and fewer bits cost less."""
+
+
 @dataclass(frozen=True, slots=True)
 class Robot:
     """Gateway and preview service, running.

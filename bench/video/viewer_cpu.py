@@ -27,7 +27,10 @@ _LEAST_BYTES: Final = 0.8 * reference.BITRATE_KBPS * 1000 / 8 * (SETTLE_S + WIND
 def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
     theirs: list[float] = []
     ours: list[float] = []
-    with camera(workdir) as source, product.robot(workdir, source, LATENCY_MS) as robot:
+    with (
+        camera(workdir) as source,
+        product.robot(workdir, source, LATENCY_MS, settings=product.FIXED_RATE) as robot,
+    ):
         for _ in range(ROUNDS):
             port = free_udp_port()
             encoder = reference.same_encoder()
