@@ -48,6 +48,25 @@ REMARKS: Final[Mapping[tuple[str, ...], str]] = {
         "srtsink listens with a backlog of 1, so some of ten simultaneous SRT handshakes are refused; these"
         " viewers redial after 100 ms, and the slowest shows it."
     ),
+    ("video.ros_camera_cpu",): (
+        "what a topic costs more is the tap, 11 to 14 % of a core: it takes 41 MB/s out of Fast DDS and hands"
+        " them to the preview, which needs as much as with shmsrc."
+    ),
+    ("video.age_far_ms",): (
+        "a frame has some ten packets here, so one in four loses one, and a lost packet comes again a round"
+        " trip (80 ms) later at the earliest. The two or three frames behind it wait for it, because the"
+        " decoder needs them in order. That is about three in five frames: without redundancy in the"
+        " stream the median can't stay below a round trip."
+    ),
+    ("video.age_narrow_fixed_worst_ms", "video.age_deep_fixed_worst_ms"): (
+        "with a fixed bit rate above what the link carries, the pictures grow older until the viewer"
+        " connects anew, and the last one goes on ageing until the first new one has come through a queue"
+        " that is still full."
+    ),
+    ("video.age_changing_freeze_ms", "video.age_changing_reconnects"): (
+        "the link loses four fifths of its rate at once, in the middle of the stream. The queue is longer"
+        " than a second before the lower bit rate has an effect, and the viewer connects anew."
+    ),
     ("soak.rss_growth_mib",): (
         "resident memory moves by tens of MiB with what libsrt holds for the last few seconds; the lowest"
         " figures of an early and of the last window are compared."
