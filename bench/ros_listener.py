@@ -21,6 +21,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from bench.ros_talker import TOPICS
 from common.ros_node import ros_node
+from common.ros_transport import chosen_transport
 from common.sampler import SAMPLING_HZ, Sampler
 from gateway.config import SourceSettings
 from gateway.ros.readers import reader_for
@@ -118,4 +119,5 @@ def wait_for_the_end(everything_arrives: Callable[[], bool]) -> None:
 
 if __name__ == "__main__":
     ways = {"sampler": sample, "callbacks": convert_each, "newest": convert_newest}
-    print(ways[sys.argv[1]](), flush=True)
+    with chosen_transport():
+        print(ways[sys.argv[1]](), flush=True)

@@ -18,6 +18,7 @@ from bench.catalogue import Part
 from bench.progress import log
 from bench.results import read_rows
 from bench.rows import Row
+from common import ros_transport
 
 _PATIENCE: Final = 3.0
 """How many times its minutes a part may take ..."""
@@ -32,8 +33,10 @@ def measured(part: Part, names: Sequence[str]) -> list[Row]:
     with tempfile.TemporaryDirectory() as directory:
         file = Path(directory) / "rows.json"
         command = [sys.executable, "-m", "bench.measure", str(file), *names]
+        # The transport that containers and systemd units have.
+        environment = {**os.environ, ros_transport.VARIABLE: "udp"}
         # A session of its own: whatever it has started is ended with it.
-        process = subprocess.Popen(command, stdout=sys.stderr, start_new_session=True)
+        process = subprocess.Popen(command, stdout=sys.stderr, env=environment, start_new_session=True)
         try:
             code = process.wait(limit_min * 60)
         except subprocess.TimeoutExpired:

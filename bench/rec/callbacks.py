@@ -21,6 +21,7 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 
 from common.ros_node import message_class
+from common.ros_transport import chosen_transport
 from recorder.intake.schemas import ENCODING, Schemas
 from recorder.mcap.records import CDR, PROFILE
 from recorder.mcap.writer import MAX_CHUNK
@@ -91,4 +92,5 @@ def _spin(executor: Any) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), sys.argv[2:])
+    with chosen_transport():
+        main(Path(sys.argv[1]), sys.argv[2:])
