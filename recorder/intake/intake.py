@@ -3,7 +3,7 @@
 | in the graph | done |
 |---|---|
 | a topic appears late | a channel from then on |
-| its type changes | another channel |
+| its type changes | another channel, after what the former one has lost |
 | it has two types at a time | the first is recorded; a problem. A DDS participant knows one type of a topic |
 | its publishers go | the subscription stays for half a minute, for those that come back |
 | publishers with another QoS join | a second subscription that fits all, then the end of the first |
@@ -134,6 +134,7 @@ class Intake:
 
     def _examine(self, wanted: frozenset[str], now: Instant) -> None:
         if not wanted:
+            # No output takes what they have lost.
             self._close(list(self._entries))
             return
         try:
@@ -143,15 +144,16 @@ class Intake:
             return
         if found.problem:
             self._found[""] = found.problem
-        self._close([key for key in self._entries if not self._is_wanted(key, wanted)])
+        self._end([key for key in self._entries if not self._is_wanted(key, wanted)], now)
         for key, presets in found.presets.items():
             self._update(key, presets, now)
-        self._close(
+        self._end(
             [
                 key
                 for key, entry in self._entries.items()
                 if now.monotonic_s - entry.published_at_s > GONE_AFTER_S
-            ]
+            ],
+            now,
         )
 
     def _is_wanted(self, key: _Key, wanted: frozenset[str]) -> bool:
@@ -163,7 +165,7 @@ class Intake:
         entry = self._entries.get(key)
         try:
             if entry is None and (offers or offers is None):
-                self._make_way(key)
+                self._make_way(key, now)
                 entry = self._entries[key] = _Entry(
                     self._open(key, presets, offers or (), now), now.monotonic_s
                 )
@@ -182,7 +184,7 @@ class Intake:
             if loss:
                 self._put([loss])
 
-    def _make_way(self, key: _Key) -> None:
+    def _make_way(self, key: _Key, now: Instant) -> None:
         """Ends the subscription to another type of the topic that has no publishers any more.
 
         Raises:
@@ -194,7 +196,7 @@ class Intake:
                 raise TypeMissingError(
                     f"{topic} is published as {type_name}, too: it is recorded as {other[1]} alone"
                 )
-            self._close([other])
+            self._end([other], now)
 
     def _offers(self, key: _Key) -> Sequence[Any] | None:
         """Returns the endpoints that publish this topic with this type; None if they can't be examined."""
@@ -225,6 +227,15 @@ class Intake:
         self._channels[key] = channel
         _log.info("%s is recorded as %s", topic, type_name)
         return source
+
+    def _end(self, keys: Sequence[_Key], now: Instant) -> None:
+        """Closes subscriptions, after what they still had and have lost since they were looked at."""
+        for key in keys:
+            entry = self._entries[key]
+            self._empty(entry, now)
+            if loss := entry.source.lost(self._offers(key)):
+                self._put([loss])
+        self._close(keys)
 
     def _close(self, keys: Sequence[_Key]) -> None:
         for key in keys:

@@ -77,6 +77,14 @@ class Source:
             now: the present instant.
         """
         self._adapt(offers, now)
+        return self.lost(offers)
+
+    def lost(self, offers: Sequence[Any] | None) -> Loss | None:
+        """Returns what has been lost since the last call, or `update`.
+
+        Args:
+            offers: endpoints of the publishers; None if unknown.
+        """
         publishers: frozenset[Hashable] | None = None
         if offers is not None:
             publishers = frozenset(tuple(each.endpoint_gid) for each in offers)

@@ -249,6 +249,34 @@ def test_losses_are_told_when_the_intake_has_caught_up(
     assert len(taken.samples("/value")) + taken.lost("/value") == 1002
 
 
+def test_a_topic_that_changes_its_type_keeps_the_count_of_its_last_second(
+    talker: Talker, taken: Taken, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The graph names the new type before the old one, whose losses have not been counted yet."""
+    text = talker.publisher("/value", String)
+    subscribed(text)
+    text.publish(String(data="first"))
+    wait_until(lambda: taken.samples("/value"), "a message")
+    monkeypatch.setattr("recorder.intake.intake.EXAMINE_EVERY_S", 1000.0)
+    ticket = taken.intake.catch_up()
+    wait_until(lambda: taken.intake.caught_up >= ticket, "the graph is not examined again by itself")
+    stall(taken, text, String(data="x"))
+    text.publish(String(data="last"))
+    wait_until(lambda: b"last" in taken.samples("/value")[-1].data, "all that has not been lost")
+    talker.fall_silent("/value", String)
+    talker.publisher("/value", Int32)
+
+    def published() -> set[str]:
+        offers = taken.intake._node.get_publishers_info_by_topic("/value")
+        return {each.topic_type for each in offers}
+
+    wait_until(lambda: published() == {"std_msgs/msg/Int32"}, "the other type alone")
+    ticket = taken.intake.catch_up()
+    wait_until(lambda: taken.intake.caught_up >= ticket, "the intake has caught up")
+    assert taken.lost("/value") > 0
+    assert len(taken.samples("/value")) + taken.lost("/value") == 1003
+
+
 def test_how_many_are_lost_is_unknown_while_the_publishers_are(talker: Talker, taken: Taken) -> None:
     with helper("tests.support.undecodable_peer", "/theirs") as peer:
         assert first_line(peer) == "ready\n"
