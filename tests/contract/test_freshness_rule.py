@@ -80,6 +80,7 @@ NEEDS_NO_AGE = {
     "PinRecordingResponse.message": _ITSELF,
     "DeleteRecordingResponse": _ITSELF,
     "ListRecordingsResponse.next_page_token": _ITSELF,
+    "GetRecordingResponse.next_page_token": _ITSELF,
     "ExportHeader": "of a file that never changes",
     "ExportChunk": "of a file that never changes",
     "GetRecordingThumbnailResponse": "of an instant that comes with it",

@@ -1024,6 +1024,7 @@ RECORDING_STATUS = numbered(
     (16, "to_copy", 4),
     (17, "last_error", "full"),
     (18, "presets", [PRESET]),
+    (19, "uncounted_gaps", 5),
 )
 RECORDING_COPY = numbered(
     recording_pb2.RecordingCopy,
@@ -1073,6 +1074,7 @@ RECORDING = numbered(
     (24, "files", [RECORDING_FILE]),
     (25, "gaps", [RECORDING_GAP]),
     (26, "sha256", SUM),
+    (27, "uncounted_gaps", 3),
 )
 EXPORT_HEADER = numbered(recording_pb2.ExportHeader, (1, "size", 1 << 33), (2, "sha256", SUM))
 EXPORT_CHUNK = Case(
@@ -1089,6 +1091,7 @@ RECORDING_CHANGED = numbered(
     (5, "state", recording_pb2.RECORDING_STATE_COMPLETE),
     (6, "stop_reason", recording_pb2.RECORDING_STOP_REASON_DISK),
     (7, "messages_lost", 0),
+    (8, "uncounted_gaps", 3),
 )
 CLOUD_STATUS = numbered(
     cloud_pb2.CloudStatus,
@@ -1159,8 +1162,8 @@ RECORDINGS = [
         (2, "next_page_token", "next"),
         (3, "status", RECORDING_STATUS),
     ),
-    numbered(recording_pb2.GetRecordingRequest, (1, "recording_id", "a")),
-    numbered(recording_pb2.GetRecordingResponse, (1, "recording", RECORDING)),
+    numbered(recording_pb2.GetRecordingRequest, (1, "recording_id", "a"), (2, "page_token", "next")),
+    numbered(recording_pb2.GetRecordingResponse, (1, "recording", RECORDING), (2, "next_page_token", "next")),
     numbered(
         recording_pb2.ExportRecordingRequest,
         (1, "recording_id", "a"),

@@ -528,6 +528,7 @@ class RecordingStateChanged(_message.Message):
     STATE_FIELD_NUMBER: _builtins.int
     STOP_REASON_FIELD_NUMBER: _builtins.int
     MESSAGES_LOST_FIELD_NUMBER: _builtins.int
+    UNCOUNTED_GAPS_FIELD_NUMBER: _builtins.int
     change: Global___RecordingChange.ValueType
     """What happened."""
     recording_id: _builtins.str
@@ -543,7 +544,9 @@ class RecordingStateChanged(_message.Message):
     stop_reason: _recording_pb2.RecordingStopReason.ValueType
     """Why it ended. Unspecified before that."""
     messages_lost: _builtins.int
-    """Messages lost from it so far. Unset: unknown."""
+    """Messages lost from it so far, as in Recording."""
+    uncounted_gaps: _builtins.int
+    """Its gaps of unknown size so far, as in Recording."""
     def __init__(
         self,
         *,
@@ -554,10 +557,11 @@ class RecordingStateChanged(_message.Message):
         state: _recording_pb2.RecordingState.ValueType = ...,
         stop_reason: _recording_pb2.RecordingStopReason.ValueType = ...,
         messages_lost: _builtins.int | None = ...,
+        uncounted_gaps: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost", "messages_lost", b"messages_lost"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost", "change", b"change", "kind", b"kind", "label", b"label", "messages_lost", b"messages_lost", "recording_id", b"recording_id", "state", b"state", "stop_reason", b"stop_reason"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost", "change", b"change", "kind", b"kind", "label", b"label", "messages_lost", b"messages_lost", "recording_id", b"recording_id", "state", b"state", "stop_reason", b"stop_reason", "uncounted_gaps", b"uncounted_gaps"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__messages_lost: _TypeAlias = _typing.Literal["messages_lost"]  # noqa: Y015
     _WhichOneofArgType__messages_lost: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost"]  # noqa: Y015

@@ -385,6 +385,7 @@ class Recording(_message.Message):
     FILES_FIELD_NUMBER: _builtins.int
     GAPS_FIELD_NUMBER: _builtins.int
     SHA256_FIELD_NUMBER: _builtins.int
+    UNCOUNTED_GAPS_FIELD_NUMBER: _builtins.int
     id: _builtins.str
     """Names it for ever: letters, digits, "-" and "_", at most 64. Also the name of its folder."""
     label: _builtins.str
@@ -418,7 +419,9 @@ class Recording(_message.Message):
     messages_written: _builtins.int
     """Messages written, frames of video included."""
     messages_lost: _builtins.int
-    """Messages lost. Unset where the middleware does not number messages."""
+    """Messages lost, as far as they were counted: those of uncounted_gaps are not among them. Unset where it is unknown
+    how many: the middleware does not number messages, or there are gaps and none was counted.
+    """
     video_frames: _builtins.int
     """Frames of video written. 0 without video."""
     trigger: _builtins.str
@@ -431,13 +434,19 @@ class Recording(_message.Message):
     """How many gaps it has."""
     sha256: _builtins.bytes
     """SHA-256 over its list of files, 32 bytes: what DeleteRecording compares. Empty while it is written."""
+    uncounted_gaps: _builtins.int
+    """Gaps of which it is unknown how many messages they lost, those of the video aside: an interruption, an error of the
+    disk, publishers that can't be examined.
+    """
     @_builtins.property
     def copy(self) -> Global___RecordingCopy:
         """The copy elsewhere."""
 
     @_builtins.property
     def files(self) -> _containers.RepeatedCompositeFieldContainer[Global___RecordingFile]:
-        """Its files, in the order of their names. At most 10000."""
+        """Its files, in the order of their numbers or names. At most 10000: GetRecordingResponse.next_page_token leads to the
+        others.
+        """
 
     @_builtins.property
     def gaps(self) -> _containers.RepeatedCompositeFieldContainer[Global___RecordingGap]:
@@ -472,10 +481,11 @@ class Recording(_message.Message):
         files: _abc.Iterable[Global___RecordingFile] | None = ...,
         gaps: _abc.Iterable[Global___RecordingGap] | None = ...,
         sha256: _builtins.bytes = ...,
+        uncounted_gaps: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost", "copy", b"copy", "messages_lost", b"messages_lost"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost", "boot_id", b"boot_id", "copy", b"copy", "duration_ms", b"duration_ms", "ended_monotonic_ns", b"ended_monotonic_ns", "ended_unix_ms", b"ended_unix_ms", "file_count", b"file_count", "files", b"files", "gap_count", b"gap_count", "gaps", b"gaps", "id", b"id", "kind", b"kind", "label", b"label", "messages_lost", b"messages_lost", "messages_written", b"messages_written", "notes", b"notes", "pinned", b"pinned", "preset", b"preset", "recorder_run_id", b"recorder_run_id", "sha256", b"sha256", "size", b"size", "started_monotonic_ns", b"started_monotonic_ns", "started_unix_ms", b"started_unix_ms", "state", b"state", "stop_reason", b"stop_reason", "trigger", b"trigger", "video_frames", b"video_frames"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost", "boot_id", b"boot_id", "copy", b"copy", "duration_ms", b"duration_ms", "ended_monotonic_ns", b"ended_monotonic_ns", "ended_unix_ms", b"ended_unix_ms", "file_count", b"file_count", "files", b"files", "gap_count", b"gap_count", "gaps", b"gaps", "id", b"id", "kind", b"kind", "label", b"label", "messages_lost", b"messages_lost", "messages_written", b"messages_written", "notes", b"notes", "pinned", b"pinned", "preset", b"preset", "recorder_run_id", b"recorder_run_id", "sha256", b"sha256", "size", b"size", "started_monotonic_ns", b"started_monotonic_ns", "started_unix_ms", b"started_unix_ms", "state", b"state", "stop_reason", b"stop_reason", "trigger", b"trigger", "uncounted_gaps", b"uncounted_gaps", "video_frames", b"video_frames"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__messages_lost: _TypeAlias = _typing.Literal["messages_lost"]  # noqa: Y015
     _WhichOneofArgType__messages_lost: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost"]  # noqa: Y015
@@ -545,6 +555,7 @@ class RecordingStatus(_message.Message):
     TO_COPY_FIELD_NUMBER: _builtins.int
     LAST_ERROR_FIELD_NUMBER: _builtins.int
     PRESETS_FIELD_NUMBER: _builtins.int
+    UNCOUNTED_GAPS_FIELD_NUMBER: _builtins.int
     state: Global___RecorderState.ValueType
     """State."""
     recording_id: _builtins.str
@@ -560,7 +571,7 @@ class RecordingStatus(_message.Message):
     messages_written: _builtins.int
     """Messages written to it."""
     messages_lost: _builtins.int
-    """Messages lost from it. Unset: unknown."""
+    """Messages lost from it, as in Recording."""
     video: _builtins.bool
     """Whether it contains video at this moment."""
     bytes_per_s: _builtins.int
@@ -581,6 +592,8 @@ class RecordingStatus(_message.Message):
     """Recordings that still have to be copied."""
     last_error: _builtins.str
     """Why it can't record and what to do, for people. Empty when all is well."""
+    uncounted_gaps: _builtins.int
+    """Its gaps of unknown size, as in Recording."""
     @_builtins.property
     def presets(self) -> _containers.RepeatedCompositeFieldContainer[Global___RecordingPreset]:
         """The presets, in the order of the configuration."""
@@ -606,10 +619,11 @@ class RecordingStatus(_message.Message):
         to_copy: _builtins.int = ...,
         last_error: _builtins.str = ...,
         presets: _abc.Iterable[Global___RecordingPreset] | None = ...,
+        uncounted_gaps: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost", "_room_s", b"_room_s", "messages_lost", b"messages_lost", "room_s", b"room_s"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost", "_room_s", b"_room_s", "bytes_per_s", b"bytes_per_s", "elapsed_ms", b"elapsed_ms", "label", b"label", "last_error", b"last_error", "messages_lost", b"messages_lost", "messages_written", b"messages_written", "preset", b"preset", "presets", b"presets", "recording_id", b"recording_id", "recordings", b"recordings", "ring_s", b"ring_s", "room_bytes", b"room_bytes", "room_s", b"room_s", "size", b"size", "snapshots_pending", b"snapshots_pending", "state", b"state", "to_copy", b"to_copy", "video", b"video"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost", "_room_s", b"_room_s", "bytes_per_s", b"bytes_per_s", "elapsed_ms", b"elapsed_ms", "label", b"label", "last_error", b"last_error", "messages_lost", b"messages_lost", "messages_written", b"messages_written", "preset", b"preset", "presets", b"presets", "recording_id", b"recording_id", "recordings", b"recordings", "ring_s", b"ring_s", "room_bytes", b"room_bytes", "room_s", b"room_s", "size", b"size", "snapshots_pending", b"snapshots_pending", "state", b"state", "to_copy", b"to_copy", "uncounted_gaps", b"uncounted_gaps", "video", b"video"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__messages_lost: _TypeAlias = _typing.Literal["messages_lost"]  # noqa: Y015
     _WhichOneofArgType__messages_lost: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost"]  # noqa: Y015
@@ -894,16 +908,20 @@ class GetRecordingRequest(_message.Message):
     DESCRIPTOR: _descriptor.Descriptor
 
     RECORDING_ID_FIELD_NUMBER: _builtins.int
+    PAGE_TOKEN_FIELD_NUMBER: _builtins.int
     recording_id: _builtins.str
     """Which."""
+    page_token: _builtins.str
+    """From the page before: its files go on there. Empty: the first page."""
     def __init__(
         self,
         *,
         recording_id: _builtins.str = ...,
+        page_token: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["recording_id", b"recording_id"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["page_token", b"page_token", "recording_id", b"recording_id"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -916,18 +934,24 @@ class GetRecordingResponse(_message.Message):
     DESCRIPTOR: _descriptor.Descriptor
 
     RECORDING_FIELD_NUMBER: _builtins.int
+    NEXT_PAGE_TOKEN_FIELD_NUMBER: _builtins.int
+    next_page_token: _builtins.str
+    """For the next page of its files. Empty: these were the last ones. A robot older than this field has one page alone,
+    of the first 10000 files: file_count then says how many there are.
+    """
     @_builtins.property
     def recording(self) -> Global___Recording:
-        """With its files and gaps."""
+        """With its files, a page at a time, and on the first page with its gaps."""
 
     def __init__(
         self,
         *,
         recording: Global___Recording | None = ...,
+        next_page_token: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["recording", b"recording"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["recording", b"recording"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["next_page_token", b"next_page_token", "recording", b"recording"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -162,8 +162,9 @@ class RecordingServiceServicer:
         raise NotImplementedError('Method not implemented!')
 
     def GetRecording(self, request, context):
-        """One recording, with its files. A connection may call it 20 times a second.
+        """One recording, with its files, a page at a time. A connection may call it 20 times a second.
 
+        INVALID_ARGUMENT: a page token that this robot has not issued for this recording.
         RESOURCE_EXHAUSTED: called too often, or the robot reads the files of too many run bundles at once.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)

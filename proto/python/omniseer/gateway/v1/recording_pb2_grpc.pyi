@@ -73,8 +73,9 @@ class RecordingServiceStub:
     RESOURCE_EXHAUSTED: called too often, or the robot reads for too many callers at once.
     """
     GetRecording: _grpc.UnaryUnaryMultiCallable[_recording_pb2.GetRecordingRequest, _recording_pb2.GetRecordingResponse]
-    """One recording, with its files. A connection may call it 20 times a second.
+    """One recording, with its files, a page at a time. A connection may call it 20 times a second.
 
+    INVALID_ARGUMENT: a page token that this robot has not issued for this recording.
     RESOURCE_EXHAUSTED: called too often, or the robot reads the files of too many run bundles at once.
     """
     ExportRecording: _grpc.UnaryStreamMultiCallable[_recording_pb2.ExportRecordingRequest, _recording_pb2.ExportRecordingResponse]
@@ -168,8 +169,9 @@ class RecordingServiceAsyncStub(RecordingServiceStub):
     RESOURCE_EXHAUSTED: called too often, or the robot reads for too many callers at once.
     """
     GetRecording: _aio.UnaryUnaryMultiCallable[_recording_pb2.GetRecordingRequest, _recording_pb2.GetRecordingResponse]  # type: ignore[assignment]
-    """One recording, with its files. A connection may call it 20 times a second.
+    """One recording, with its files, a page at a time. A connection may call it 20 times a second.
 
+    INVALID_ARGUMENT: a page token that this robot has not issued for this recording.
     RESOURCE_EXHAUSTED: called too often, or the robot reads the files of too many run bundles at once.
     """
     ExportRecording: _aio.UnaryStreamMultiCallable[_recording_pb2.ExportRecordingRequest, _recording_pb2.ExportRecordingResponse]  # type: ignore[assignment]
@@ -290,8 +292,9 @@ class RecordingServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _recording_pb2.GetRecordingRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_recording_pb2.GetRecordingResponse, _abc.Awaitable[_recording_pb2.GetRecordingResponse]]:
-        """One recording, with its files. A connection may call it 20 times a second.
+        """One recording, with its files, a page at a time. A connection may call it 20 times a second.
 
+        INVALID_ARGUMENT: a page token that this robot has not issued for this recording.
         RESOURCE_EXHAUSTED: called too often, or the robot reads the files of too many run bundles at once.
         """
 

@@ -52,11 +52,13 @@ class WatchStateResponse(_message.Message):
     DISK_SIZE_BYTES_FIELD_NUMBER: _builtins.int
     DISK_SHORT_FIELD_NUMBER: _builtins.int
     ENDED_FIELD_NUMBER: _builtins.int
+    UNCOUNTED_GAPS_FIELD_NUMBER: _builtins.int
+    RING_FAILURES_FIELD_NUMBER: _builtins.int
     instance_id: _builtins.str
     """Random for every process."""
     messages_lost: _builtins.int
-    """Messages lost since the process started, of the ring and all recordings. Unset where the middleware does not
-    number messages.
+    """Messages lost from what is written at present, the recording or the ring, whichever lacks more. Unset as in
+    Recording.
     """
     messages_dropped: _builtins.int
     """Messages dropped since the process started because its queue was full."""
@@ -68,6 +70,10 @@ class WatchStateResponse(_message.Message):
     """Whether room is short: the quota or the minimum of free space will be reached within an hour, or recording
     has stopped because of it.
     """
+    uncounted_gaps: _builtins.int
+    """Gaps of unknown size in what is written at present, as messages_lost."""
+    ring_failures: _builtins.int
+    """Attempts to write the ring that failed since the last success."""
     @_builtins.property
     def status(self) -> _recording_pb2.RecordingStatus:
         """As operators see it. Never RECORDER_STATE_UNSPECIFIED or RECORDER_STATE_UNREACHABLE."""
@@ -94,10 +100,12 @@ class WatchStateResponse(_message.Message):
         disk_size_bytes: _builtins.int = ...,
         disk_short: _builtins.bool = ...,
         ended: _abc.Iterable[_recording_pb2.Recording] | None = ...,
+        uncounted_gaps: _builtins.int = ...,
+        ring_failures: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost", "messages_lost", b"messages_lost", "newest", b"newest", "status", b"status"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost", "disk_free_bytes", b"disk_free_bytes", "disk_short", b"disk_short", "disk_size_bytes", b"disk_size_bytes", "ended", b"ended", "instance_id", b"instance_id", "messages_dropped", b"messages_dropped", "messages_lost", b"messages_lost", "newest", b"newest", "status", b"status"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost", "disk_free_bytes", b"disk_free_bytes", "disk_short", b"disk_short", "disk_size_bytes", b"disk_size_bytes", "ended", b"ended", "instance_id", b"instance_id", "messages_dropped", b"messages_dropped", "messages_lost", b"messages_lost", "newest", b"newest", "ring_failures", b"ring_failures", "status", b"status", "uncounted_gaps", b"uncounted_gaps"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__messages_lost: _TypeAlias = _typing.Literal["messages_lost"]  # noqa: Y015
     _WhichOneofArgType__messages_lost: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost"]  # noqa: Y015
