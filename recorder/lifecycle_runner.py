@@ -2,16 +2,12 @@
 
 import asyncio
 import logging
-from typing import Final
 
-from common.backoff import Backoff
 from common.broadcast import Broadcast
 from recorder.lifecycle import Event, Phase, State, step
+from recorder.retries import Retries
 
 _log = logging.getLogger(__name__)
-
-_FIRST_RETRY_S: Final = 1.0
-_LONGEST_RETRY_S: Final = 30.0
 
 
 class LifecycleRunner:
@@ -22,26 +18,21 @@ class LifecycleRunner:
         phase: of the lifecycle.
         error: why nothing can be recorded, or why a recording was stopped; empty when all is well.
         stopped_by_disk: whether a full disk has ended a recording, and none has begun since.
+        retries: of the disk, while it takes no recordings.
     """
 
     def __init__(self) -> None:
         self._loop = asyncio.get_running_loop()
-        self._backoff = Backoff(_FIRST_RETRY_S, _LONGEST_RETRY_S)
-        self._retry_at_s = 0.0
         self.changes = Broadcast()
         self.phase = Phase(State.RECOVERING, self._loop.time())
         self.error = ""
         self.stopped_by_disk = False
+        self.retries = Retries(self._loop.time)
 
     @property
     def state(self) -> State:
         """The phase's state."""
         return self.phase.state
-
-    @property
-    def retry_due(self) -> bool:
-        """Whether what has failed may be tried again."""
-        return self._loop.time() >= self._retry_at_s
 
     def move(self, event: Event) -> None:
         """Enters the phase that follows on an event.
@@ -57,19 +48,15 @@ class LifecycleRunner:
 
     def fault(self, text: str) -> None:
         """Enters FAULTED, with what is wrong for people."""
-        self.error = text
-        self.try_later(text)
-        self.move(Event.FAILURE)
-
-    def try_later(self, text: str) -> None:
-        """Logs what has failed, and lets it be tried again after the next pause of the backoff."""
         _log.error("%s", text)
-        self._retry_at_s = self._loop.time() + self._backoff.next_s()
+        self.error = text
+        self.retries.failed()
+        self.move(Event.FAILURE)
 
     def close_well(self) -> None:
         """Enters IDLE after a recording that the disk has taken to its end."""
         self.move(Event.CLOSED)
-        self._backoff.reset()
+        self.retries.succeeded()
         self.error = ""
 
     def clear(self) -> None:

@@ -8,8 +8,9 @@ from typing import Final, Literal
 from recorder.assembly import Parts
 from recorder.lifecycle import Event, State
 from recorder.reports import Failed, Finished
+from recorder.retries import Retries
 from recorder.status_reader import StatusReader
-from recorder.store.housekeeping import LEAST_ROOM
+from recorder.store.housekeeping import LEAST_ROOM, attempt
 from recorder.store.manifest import Manifest, RecordingState, StopReason
 from recorder.store.room import is_full
 from recorder.store.salvage import salvage, with_interruption
@@ -44,6 +45,7 @@ class Recorder:
         self._loaded = False
         self._room_at_s = 0.0
         self._notified: object = None
+        self._deletions = Retries(self._loop.time)
         self.changing = asyncio.Lock()
 
     async def run(self, stop: asyncio.Event) -> None:
@@ -80,6 +82,8 @@ class Recorder:
                     await self._manual.take(closed)
                 case Finished(_, closed) if self._ring and closed.path.parent == self._ring.directory:
                     await self._ring.take(closed)
+                    if self._lifecycle.state is not State.FAULTED:
+                        self._lifecycle.retries.succeeded()
 
     async def end(self, reason: StopReason) -> None:
         """Ends the running recording."""
@@ -181,8 +185,8 @@ class Recorder:
         now_s = self._loop.time()
         self._check_writer()
         await self.take_reports()
-        if self._lifecycle.retry_due:
-            await (self._retry() if self._lifecycle.state is State.FAULTED else self._retry_ring())
+        await self._try_again()
+        await self._end_deletions()
         if self._manual.at_its_limit:
             await self.end(StopReason.LIMIT)
         if self._ring:
@@ -219,6 +223,26 @@ class Recorder:
 
     # --- the disk ---
 
+    async def _try_again(self) -> None:
+        """Tries what the disk has failed, each thing after its own pause."""
+        if self._lifecycle.state is State.FAULTED:
+            if self._lifecycle.retries.due:
+                await self._retry()
+        elif self._ring and self._ring.retries.due and not self._outputs.ring:
+            # A full disk may need its own room.
+            await self._parts.housekeeping.make_room(LEAST_ROOM, recordings=False)
+            await self._open_ring()
+
+    async def _end_deletions(self) -> None:
+        """Goes on with deletions that the disk has failed."""
+        catalogue = self._parts.catalogue
+        if not (catalogue.cut_off and self._deletions.due):
+            return
+        if await attempt("files of deleted recordings stay", catalogue.end_deletions):
+            self._deletions.succeeded()
+        else:
+            self._deletions.failed()
+
     async def _retry(self) -> None:
         """Tries whether the disk takes data again."""
         if not self._loaded:
@@ -252,12 +276,6 @@ class Recorder:
         elif self._ring:
             await self.finish_snapshots(self._ring.due(all_of_them=True), StopReason.DISK)
 
-    async def _retry_ring(self) -> None:
-        """Tries whether the ring can be written again; a full disk may need its own room."""
-        if self._ring and not self._outputs.ring:
-            await self._parts.housekeeping.make_room(LEAST_ROOM, recordings=False)
-            await self._open_ring()
-
     async def _open_ring(self) -> None:
         faulted = self._lifecycle.state in (State.FAULTED, State.RECOVERING)
         if self._ring is None or self._outputs.ring or faulted:
@@ -273,5 +291,3 @@ class Recorder:
         # A full disk is no fault: a recording that begins may delete older ones, which the ring may not.
         if self._lifecycle.state is State.IDLE and not is_full(error):
             self._lifecycle.fault(self._ring.problem)
-        else:
-            self._lifecycle.try_later(self._ring.problem)

@@ -14,6 +14,7 @@ from recorder.config import RecorderSettings
 from recorder.incidents import SEVERITIES, Incidents, Rules
 from recorder.outages import Outages
 from recorder.outputs import Outputs
+from recorder.retries import Retries
 from recorder.store.catalogue import Catalogue
 from recorder.store.folder import new_id
 from recorder.store.housekeeping import Housekeeping, attempt
@@ -57,6 +58,7 @@ class RingRecorder:
 
     Attributes:
         problem: why it can't be written, for people; empty if it can.
+        retries: of the ring, whatever becomes of recordings meanwhile.
     """
 
     def __init__(
@@ -83,6 +85,7 @@ class RingRecorder:
         self._pending: list[_Snapshot] = []
         self._outages = Outages()
         self.problem = ""
+        self.retries = Retries(time.monotonic)
         incidents = settings.incidents
         self._incidents = Incidents(
             Rules(
@@ -147,6 +150,8 @@ class RingRecorder:
         """Takes note that the disk has failed it; snapshots of this time have a gap."""
         output, self._outputs.ring = self._outputs.ring, None
         self.problem = f"the ring can't be written: {error.strerror}; it is tried again by itself"
+        self.retries.failed()
+        _log.error("%s (attempt %d)", self.problem, self.retries.failures)
         self._outages.begin(GapCause.DISK, output.progress.last_ns if output else time.time_ns())
 
     async def close(self) -> None:
@@ -161,7 +166,8 @@ class RingRecorder:
             await asyncio.wrap_future(self._writer.rotate(output))
 
     async def take(self, closed: Closed) -> None:
-        """Takes a segment that has become final."""
+        """Takes a segment that has become final: the disk takes the ring."""
+        self.retries.succeeded()
         segment = RingSegment(closed.number, closed.began_ns, closed.ended_ns, closed.summary)
         self._ring.add(segment)
         await self._link(segment)

@@ -139,6 +139,11 @@ class StatusReader:
         return self._parts.ring.held_s if self._parts.ring else 0
 
     @property
+    def ring_failures(self) -> int:
+        """Attempts to write the ring that failed since the last success."""
+        return self._parts.ring.retries.failures if self._parts.ring else 0
+
+    @property
     def dropped(self) -> int:
         """Messages dropped because the queue was full."""
         return self._parts.queue.dropped

@@ -165,6 +165,7 @@ def watch_state(status_reader: StatusReader, settings: RecorderSettings) -> reco
         disk_size_bytes=status_reader.room.disk.size_bytes,
         disk_short=status_reader.disk_short,
         ended=[recording(status_reader, each) for each in status_reader.recently_ended],
+        ring_failures=status_reader.ring_failures,
     )
     if (lost := status_reader.lost) is not None:
         message.messages_lost = lost

@@ -31,7 +31,7 @@ from recorder.values import SegmentSummary
 
 _log = logging.getLogger(__name__)
 
-_NUMBERED: Final = re.compile(r"(\d{6})\.mcap")
+_NUMBERED: Final = re.compile(r"(\d{6,9})\.mcap")
 
 
 class Catalogue:
@@ -43,11 +43,13 @@ class Catalogue:
     Attributes:
         revision: grows with every change.
         problems: by recording, for people: what keeps it from being completed.
+        cut_off: folders of deleted recordings that still have files: `end_deletions` goes on.
     """
 
     def __init__(self, root: Path) -> None:
         self.revision = 0
         self.problems: dict[str, str] = {}
+        self.cut_off: set[Path] = set()
         self._folder = root / RECORDINGS
         self._manifests: dict[str, Manifest] = {}
 
@@ -79,6 +81,7 @@ class Catalogue:
         """
         make_directory(self._folder)
         self.problems.clear()
+        self.cut_off.clear()
         for folder in sorted(self._folder.iterdir()):
             if not ID.fullmatch(folder.name) or folder.is_symlink() or not folder.is_dir():
                 continue
@@ -126,18 +129,28 @@ class Catalogue:
         It needs no room: a full disk is what it is for.
 
         Raises:
-            OSError: the disk fails; the next start goes on.
+            OSError: the disk fails. Unless it is still listed, the rest is deleted later: see `cut_off`.
         """
         folder = self.folder_of(manifest)
-        there = folder.is_dir()  # Somebody may have deleted it by hand.
+        there = folder.is_dir()  # It may have been deleted by hand.
         if there:
             deletion.begin(folder)
         self._forget(manifest)
         if there:
-            deletion.complete(folder)
+            self._delete(folder)
+
+    def end_deletions(self) -> bool:
+        """Deletes what is left of deleted recordings; returns True.
+
+        Raises:
+            OSError: the disk fails; it can be tried again.
+        """
+        for folder in sorted(self.cut_off):
+            self._delete(folder)
+        return True
 
     def discard(self, manifest: Manifest) -> None:
-        """Deletes a recording that could not be begun, as far as the disk permits."""
+        """Deletes a recording, as far as the disk permits."""
         try:
             self.delete(manifest)
         except OSError as error:
@@ -146,7 +159,13 @@ class Catalogue:
 
     def _read(self, folder: Path) -> None:
         if deletion.has_begun(folder):
-            deletion.complete(folder)
+            self._go_on_deleting(folder)
+            return
+        try:
+            deletion.clear_away(folder)
+        except OSError as error:  # What is whole in it can be read all the same.
+            _log.warning("unfinished files stay in %s: %s", folder, error)
+        if not folder.is_dir():
             return
         try:
             manifest: Manifest | None = read_manifest(folder)
@@ -156,7 +175,20 @@ class Catalogue:
             return
         self._manifests[manifest.id] = manifest
         if manifest.deleting:
-            self.delete(manifest)
+            self.discard(manifest)
+
+    def _go_on_deleting(self, folder: Path) -> None:
+        """Ends a deletion that was cut off. One that the disk refuses to end brings no recording back."""
+        try:
+            self._delete(folder)
+        except OSError as error:
+            _log.error("the deletion of %s goes on later: %s", folder.name, error)
+
+    def _delete(self, folder: Path) -> None:
+        self.cut_off.add(folder)
+        if folder.is_dir():
+            deletion.complete(folder)
+        self.cut_off.discard(folder)
 
     def _forget(self, manifest: Manifest) -> None:
         self._manifests.pop(manifest.id, None)

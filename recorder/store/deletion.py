@@ -9,7 +9,15 @@ from typing import Final
 
 from common.private_files import sync_directory
 from recorder.mcap.records import PART
-from recorder.store.folder import DAMAGED, DAMAGED_MANIFEST, DATA, MANIFEST, METADATA, SEGMENT_FILE
+from recorder.store.folder import (
+    DAMAGED,
+    DAMAGED_MANIFEST,
+    DATA,
+    MANIFEST,
+    METADATA,
+    SEGMENT_FILE,
+    clear_temporaries,
+)
 
 _DELETING: Final = f"{MANIFEST}.deleting"
 _OURS: Final = re.compile(
@@ -43,14 +51,36 @@ def complete(folder: Path) -> None:
         OSError: the disk fails; it can be tried again.
     """
     data = folder / DATA
-    if data.is_dir() and not data.is_symlink():
-        for path in [each for each in data.iterdir() if _OURS.fullmatch(each.name)]:
+    if _is_directory(data):
+        ours = [each for each in data.iterdir() if _OURS.fullmatch(each.name)]
+        for path in [each for each in ours if not _is_directory(each)]:
             path.unlink(missing_ok=True)
+        clear_temporaries(data)
         _remove_if_empty(data)
+    clear_temporaries(folder)
     # The mark last.
     for name in (DAMAGED_MANIFEST, MANIFEST, _DELETING):
         (folder / name).unlink(missing_ok=True)
     _remove_if_empty(folder)
+
+
+def clear_away(folder: Path) -> None:
+    """Deletes what a killed process has left of files, and the folder of a recording that never had any.
+
+    Raises:
+        OSError: the disk fails.
+    """
+    data = folder / DATA
+    clear_temporaries(folder)
+    if _is_directory(data):
+        clear_temporaries(data)
+        if not any(each != data for each in folder.iterdir()):
+            _remove_if_empty(data)
+    _remove_if_empty(folder)
+
+
+def _is_directory(path: Path) -> bool:
+    return path.is_dir() and not path.is_symlink()
 
 
 def _remove_if_empty(directory: Path) -> None:

@@ -20,7 +20,8 @@ ID: Final = re.compile(r"\d{8}T\d{6}Z-[0-9a-f]{6}")
 """Of recordings that the recorder makes: the start by the calendar clock in UTC, and a random part."""
 RECORDINGS: Final = "recordings"
 DATA: Final = "data"
-SEGMENT_FILE: Final = re.compile(r"\d{6}\.mcap")
+SEGMENT_FILE: Final = re.compile(r"(?:\d{6}|[1-9]\d{6,8})\.mcap")
+"""Six digits, from the millionth on as many as it takes."""
 SEGMENT: Final = re.compile(f"{DATA}/{SEGMENT_FILE.pattern}")
 """A segment's name in a recording's folder."""
 MANIFEST: Final = "manifest.json"
@@ -29,6 +30,13 @@ DAMAGED: Final = ".damaged"
 DAMAGED_MANIFEST: Final = f"{MANIFEST}{DAMAGED}"
 METADATA: Final = f"{DATA}/metadata.yaml"
 """rosbag2's file, beside the segments: some readers look for them nowhere else."""
+COPY: Final = ".copy"
+"""Suffix of a segment that is being copied because it can't be linked; its name begins with a dot."""
+_TEMPORARY: Final = re.compile(
+    rf"\.{SEGMENT_FILE.pattern}{re.escape(COPY)}"
+    r"|\.(?:manifest\.json|metadata\.yaml|state\.json)\.[a-z0-9_]{8}"
+)
+"""Names of files that get their own name when they are complete: here, and those of tempfile.mkstemp."""
 
 _FILE_MODE: Final = 0o640
 _DIRECTORY_MODE: Final = 0o750
@@ -50,19 +58,36 @@ def segment_number(name: str) -> int:
 
 
 def files_named(directory: Path, name: re.Pattern[str], suffix: str = "") -> list[Path]:
-    """Returns the files of a directory whose names, before the suffix, match; in order, without links.
+    """Returns the files of a directory whose names, before the suffix, match; by number, without links.
 
     Raises:
         OSError: the directory can't be read.
     """
-    return sorted(
+    found = [
         path
         for path in directory.iterdir()
         if path.name.endswith(suffix)
         and name.fullmatch(path.name.removesuffix(suffix))
         and path.is_file()
         and not path.is_symlink()
-    )
+    ]
+    # Of numbers with as many digits as they need at least, the longer name is the greater one.
+    return sorted(found, key=lambda path: (len(path.name), path.name))
+
+
+def is_temporary(path: Path) -> bool:
+    """Returns whether a file is one that `replace_file`, or a copy, had not completed."""
+    return bool(_TEMPORARY.fullmatch(path.name)) and (path.is_symlink() or not path.is_dir())
+
+
+def clear_temporaries(directory: Path) -> None:
+    """Deletes what a process that was killed while it wrote has left. Only while no other one writes there.
+
+    Raises:
+        OSError: the disk fails.
+    """
+    for path in [each for each in directory.iterdir() if is_temporary(each)]:
+        path.unlink(missing_ok=True)
 
 
 def put_aside(path: Path) -> Path:

@@ -15,7 +15,7 @@ from common.private_files import sync_directory
 from recorder.mcap.reading import summarise
 from recorder.mcap.records import PART
 from recorder.mcap.recovery import recover
-from recorder.store.folder import files_named, make_directory, segment_name
+from recorder.store.folder import COPY, files_named, make_directory, segment_name
 from recorder.store.manifest import Manifest
 from recorder.store.room import is_full
 from recorder.values import SegmentSummary
@@ -209,7 +209,7 @@ def link_next(folder: Path, manifest: Manifest, segment: RingSegment) -> Manifes
 
 
 def _copy(source: Path, target: Path) -> None:
-    temporary = target.with_name(f".{target.name}.copy")
+    temporary = target.with_name(f".{target.name}{COPY}")
     try:
         shutil.copyfile(source, temporary)
         with temporary.open("rb") as file:

@@ -8,7 +8,7 @@ from typing import Final
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from common.errors import InvalidRequestError
-from recorder.store.folder import replace_file
+from recorder.store.folder import clear_temporaries, replace_file
 
 _log = logging.getLogger(__name__)
 
@@ -53,6 +53,7 @@ class StateFile:
     def load(self) -> None:
         """Reads the file; one that is missing or damaged counts as empty."""
         try:
+            clear_temporaries(self._path.parent)
             self._content = _Content.model_validate_json(self._path.read_bytes())
         except FileNotFoundError:
             return

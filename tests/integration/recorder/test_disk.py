@@ -8,12 +8,14 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 from common.errors import NotFoundError, PreconditionError, TooMuchError, UserError
 from recorder.lifecycle import State
+from recorder.mcap.writer import SegmentWriter
 from recorder.requests import SnapshotOptions, StartOptions
 from recorder.store.folder import replace_file
 from recorder.store.lock import folder_lock
@@ -171,6 +173,50 @@ async def test_a_snapshot_tells_when_the_ring_could_not_be_written(tmp_path: Pat
         found = running.status_reader.get(made.recording.id)
         (gap,) = [each for each in found.gaps if each.cause is GapCause.DISK]
         assert gap.began_ns <= handed_ns < gap.ended_ns
+
+
+async def test_the_ring_is_tried_again_after_pauses_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever recordings that end well meanwhile say of the disk: the ring may be on another one."""
+    flush, failures_s = SegmentWriter.flush, list[float]()
+
+    def broken(writer: SegmentWriter) -> None:
+        # While nothing else is recorded, it would end in FAULTED, and the next start be refused.
+        if writer._path.parent.name == "ring" and running.status_reader.running:
+            failures_s.append(time.monotonic())
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+        flush(writer)
+
+    async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
+        with monkeypatch.context() as patched:
+            patched.setattr(SegmentWriter, "flush", broken)
+            for number in range(4):
+                await running.operations.start(f"start {number}", StartOptions())
+                await running.until(lambda: len(failures_s) > number)  # noqa: B023  # waited for
+                await running.until(lambda: running.status_reader.ring_failures == len(failures_s))
+                done = (await running.operations.stop(f"stop {number}", "")).recording
+                assert done
+                assert done.state is RecordingState.COMPLETE
+        pauses_s = [after - before for before, after in pairwise(failures_s)]
+        assert all(pause_s >= least_s for pause_s, least_s in zip(pauses_s, (1.0, 2.0, 4.0), strict=True))
+
+
+async def test_a_ring_that_is_written_again_has_no_failures_behind_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(_writer: SegmentWriter) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
+        with monkeypatch.context() as patched:
+            patched.setattr(SegmentWriter, "flush", broken)
+            await running.until(lambda: running.status_reader.ring_failures == 1)
+        await running.until(lambda: running.status_reader.writes)
+        assert running.status_reader.ring_failures == 1, "an open file proves nothing"
+        Source(running.queue).send(10)
+        await running.operations.snapshot("1", SnapshotOptions(pre_s=5, post_s=0), "anyone")
+        await running.until(lambda: running.status_reader.ring_failures == 0)
 
 
 async def test_a_snapshot_over_a_restart_tells_of_it(tmp_path: Path) -> None:
@@ -396,6 +442,28 @@ async def test_a_deletion_that_was_cut_off_is_gone_on_with(
     async with running_recorder(tmp_path) as running:
         assert running.status_reader.recordings == []
         assert not running.status_reader.folder_of(done).exists()
+
+
+async def test_a_deletion_that_the_disk_has_failed_ends_by_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It seemed done, and took its room until the next start of the recorder."""
+    async with running_recorder(tmp_path) as running:
+        done = await recorded(running)
+        folder, unlink = running.status_reader.folder_of(done), Path.unlink
+
+        def refuse(path: Path, missing_ok: bool = False) -> None:
+            if path.suffix == ".mcap":
+                raise OSError(errno.EIO, os.strerror(errno.EIO))
+            unlink(path, missing_ok=missing_ok)
+
+        with monkeypatch.context() as patched:
+            patched.setattr(Path, "unlink", refuse)
+            with pytest.raises(OSError, match="Input"):
+                await running.operations.delete("1", done.id, b"", force=False)
+        assert (folder / "data" / "000000.mcap").exists()
+        assert running.status_reader.recordings == []
+        await running.until(lambda: not folder.exists())
 
 
 async def cut_off(root: Path) -> tuple[Manifest, Manifest]:
