@@ -35,12 +35,22 @@ _NS_PER_MS: Final = 1_000_000
 
 @dataclass(slots=True)
 class _Snapshot:
-    """A snapshot that is being made; instants of CLOCK_MONOTONIC in ns."""
+    """A snapshot that is being made; instants of CLOCK_MONOTONIC in ns.
+
+    Attributes:
+        first_ns: of its first message; None while it has none.
+    """
 
     id: str
     kind: Kind
     from_ns: int
     until_ns: int
+    first_ns: int | None = None
+
+    def takes(self, segment: RingSegment) -> None:
+        """Takes note of a segment that it has."""
+        firsts = [each for each in (self.first_ns, segment.first_message_ns) if each is not None]
+        self.first_ns = min(firsts, default=None)
 
 
 class RingRecorder:
@@ -168,7 +178,9 @@ class RingRecorder:
     async def take(self, closed: Closed) -> None:
         """Takes a segment that has become final: the disk takes the ring."""
         self.retries.succeeded()
-        segment = RingSegment(closed.number, closed.began_ns, closed.ended_ns, closed.summary)
+        segment = RingSegment(
+            closed.number, closed.began_ns, closed.ended_ns, closed.offset_ns, closed.summary
+        )
         self._ring.add(segment)
         await self._link(segment)
 
@@ -215,22 +227,24 @@ class RingRecorder:
             state=RecordingState.RECORDING,
             preset=self._preset,
             with_video=self._settings.records_video(self._preset),
-            started_unix_ms=(calendar_ns - pre_ns) // _NS_PER_MS,
+            started_unix_ms=max(calendar_ns - pre_ns, 0) // _NS_PER_MS,
             started_monotonic_ns=max(now_ns - pre_ns, 0),
             boot_id=self._boot_id,
             run_id=self._run_id,
             trigger=trigger[:_LONGEST_TRIGGER],
             window_ns=(calendar_ns - pre_ns, calendar_ns + post_ns),
         )
+        segments = self._ring.within(now_ns - pre_ns, now_ns + post_ns)
         try:
-            made = await asyncio.to_thread(
-                self._begun, manifest, self._ring.within(now_ns - pre_ns, now_ns + post_ns)
-            )
+            made = await asyncio.to_thread(self._begun, manifest, segments)
         except OSError as error:
             raise TooMuchError(
                 f"the disk refuses the snapshot: {error.strerror}", Reason.DISK_FULL
             ) from error
-        self._pending.append(_Snapshot(made.id, kind, now_ns - pre_ns, now_ns + post_ns))
+        snapshot = _Snapshot(made.id, kind, now_ns - pre_ns, now_ns + post_ns)
+        for each in segments:
+            snapshot.takes(each)
+        self._pending.append(snapshot)
         _log.info("%s %s is being made: %s", kind, made.id, trigger or "requested")
         return made
 
@@ -294,11 +308,13 @@ class RingRecorder:
         update: dict[str, Any] = {"ended_unix_ms": now_ms, "ended_monotonic_ns": now_ns, "numbered": numbered}
         if manifest.window_ns:
             update["gaps"] = (*manifest.gaps, *self._outages.within(*manifest.window_ns, time.time_ns()))
+        # The calendar clock may have been set meanwhile: the earliest time need not be the first message's.
         firsts = [each.first_ns for each in manifest.segments if each.first_ns is not None]
         if firsts:
-            began_ms = min(firsts) // _NS_PER_MS
-            update["started_unix_ms"] = began_ms
-            update["started_monotonic_ns"] = max(now_ns - max(now_ms - began_ms, 0) * _NS_PER_MS, 0)
+            update["started_unix_ms"] = firsts[0] // _NS_PER_MS
+        snapshot = next((each for each in self._pending if each.id == manifest.id), None)
+        if snapshot and snapshot.first_ns is not None:
+            update["started_monotonic_ns"] = max(0, min(snapshot.first_ns, now_ns))
         return manifest.model_copy(update=update)
 
     async def _merge(self, recording_id: str, fault_id: str) -> None:
@@ -321,6 +337,7 @@ class RingRecorder:
                     lambda folder=folder, manifest=manifest: link_next(folder, manifest, segment),  # type: ignore[misc]
                 )
                 if linked:
+                    snapshot.takes(segment)
                     await self._keep(linked)
 
     async def _keep(self, manifest: Manifest) -> None:

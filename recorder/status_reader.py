@@ -78,7 +78,8 @@ class StatusReader:
     def recently_ended(self) -> list[Manifest]:
         """The recordings that ended last, the newest first."""
         done = [each for each in list(self._parts.catalogue.all.values()) if not each.state.open]
-        return sorted(done, key=lambda each: each.ended_unix_ms, reverse=True)[:NEWEST_ENDED]
+        # The calendar clock may have been set back since.
+        return sorted(done, key=lambda each: (each.ordinal, each.ended_unix_ms), reverse=True)[:NEWEST_ENDED]
 
     @property
     def room(self) -> Room:

@@ -30,11 +30,16 @@ _WITHOUT_LINKS: Final = (errno.EXDEV, errno.EPERM, errno.EMLINK, errno.EOPNOTSUP
 
 @dataclass(frozen=True, slots=True)
 class RingSegment:
-    """One segment of the ring; instants of CLOCK_MONOTONIC in ns."""
+    """One segment of the ring; instants of CLOCK_MONOTONIC in ns.
+
+    Attributes:
+        offset_ns: what its messages' calendar clock was ahead of that one.
+    """
 
     number: int
     began_ns: int
     ended_ns: int
+    offset_ns: int
     summary: SegmentSummary
 
     @property
@@ -42,9 +47,17 @@ class RingSegment:
         """Where it is."""
         return self.summary.path
 
+    @property
+    def first_message_ns(self) -> int | None:
+        """When its first message was received; None without one."""
+        first_ns = self.summary.first_ns
+        return None if first_ns is None else first_ns - self.offset_ns
+
     def overlaps(self, from_ns: int, until_ns: int) -> bool:
-        """Returns whether a part of it lies in a window."""
-        return self.ended_ns > from_ns and self.began_ns < until_ns
+        """Returns whether a part of it lies in a window, by its messages, which may have waited."""
+        first_ns = self.first_message_ns
+        began_ns = self.began_ns if first_ns is None else min(self.began_ns, first_ns)
+        return self.ended_ns > from_ns and began_ns < until_ns
 
 
 class Ring:
@@ -142,12 +155,13 @@ class Ring:
         return [each for each in self.segments if each.overlaps(from_ns, until_ns)]
 
     def held_ns(self, now_ns: int) -> int:
-        """Returns how far back the ring reaches."""
+        """Returns how far back the ring reaches, at most as far as is kept."""
         segments = list(self.segments)
-        return now_ns - segments[0].began_ns if segments else 0
+        held_ns = now_ns - segments[0].began_ns if segments else 0
+        return max(0, min(held_ns, self._kept_ns))
 
     def _kept_from_ns(self, segment: RingSegment) -> int:
-        return max(segment.ended_ns, self._loaded_ns) if segment.number < self._left else segment.ended_ns
+        return self._loaded_ns if segment.number < self._left else segment.ended_ns
 
     def _take(self, path: Path, summary_of: Callable[[Path], SegmentSummary | None]) -> RingSegment | None:
         number = int(path.name[:8])
@@ -162,9 +176,10 @@ class Ring:
                 raise
             _log.warning("%s can't be read and is left out of the ring: %s", path, error.strerror or error)
             return None
-        # Its instants are known by the calendar clock alone.
-        offset_ns = time.monotonic_ns() - time.time_ns()
-        segment = RingSegment(number, summary.first_ns + offset_ns, summary.last_ns + offset_ns, summary)
+        # Its instants are known by the calendar clock alone: of the future where that was set back since.
+        offset_ns = time.time_ns() - time.monotonic_ns()
+        began_ns, ended_ns = summary.first_ns - offset_ns, summary.last_ns - offset_ns
+        segment = RingSegment(number, began_ns, ended_ns, offset_ns, summary)
         self.segments.append(segment)
         return segment
 

@@ -51,12 +51,17 @@ class Head:
 
 @dataclass(frozen=True, slots=True)
 class Closed:
-    """A segment that is final; instants of CLOCK_MONOTONIC in ns, from opening to closing."""
+    """A segment that is final; instants of CLOCK_MONOTONIC in ns, from opening to closing.
+
+    Attributes:
+        offset_ns: what its messages' calendar clock was ahead of CLOCK_MONOTONIC.
+    """
 
     path: Path
     number: int
     began_ns: int
     ended_ns: int
+    offset_ns: int
     summary: SegmentSummary
 
 
@@ -194,7 +199,8 @@ class Output:
         self._segment = None
         self._closed_bytes += summary.size
         self._report()
-        final = Closed(summary.path, self._number, self._began_ns, time.monotonic_ns(), summary)
+        ended_ns = time.monotonic_ns()
+        final = Closed(summary.path, self._number, self._began_ns, ended_ns, self._clock_offset_ns, summary)
         self._number += 1
         self._closed(self, final)
 

@@ -13,7 +13,9 @@ from rosbags.rosbag2 import Reader
 from common.errors import InvalidRequestError, NotFoundError, PreconditionError
 from recorder.lifecycle import State
 from recorder.requests import SnapshotOptions, StartOptions
-from recorder.store.manifest import Kind, RecordingState, StopReason
+from recorder.status_reader import NEWEST_ENDED
+from recorder.store.folder import new_id
+from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason
 from recorder.values import Ended, GapCause, Loss
 from recorder.writing.output import Output
 from tests.support.recorder_in_process import Source, channel, numbers, running_recorder
@@ -124,6 +126,44 @@ async def test_a_clock_that_steps_begins_a_segment(tmp_path: Path) -> None:
         assert done
         assert [segment.messages for segment in done.segments] == [10, 10, 10]
         assert running.status_reader.live(done).duration_ms < 60_000
+
+
+@pytest.mark.parametrize("hours", [1, -1])
+async def test_a_snapshot_over_a_step_of_the_clock_is_as_long_as_it_was(tmp_path: Path, hours: int) -> None:
+    async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
+        await running.until(lambda: running.status_reader.writes)
+        source = Source(running.queue)
+        source.send(10)
+        source.send(10, step_ns=hours * 3_600_000_000_000)
+        made = await running.operations.snapshot("1", SnapshotOptions(pre_s=30, post_s=0), "someone")
+        assert made.recording
+        await running.until(lambda: not running.status_reader.snapshots_pending)
+        done = running.status_reader.get(made.recording.id)
+        assert [segment.messages for segment in done.segments] == [10, 10]
+        assert running.status_reader.live(done).duration_ms < 60_000
+        first_ns = done.segments[0].first_ns
+        assert first_ns
+        assert done.started_unix_ms == first_ns // 1_000_000, "by the clock of its first message"
+
+
+async def test_what_has_ended_last_is_no_question_of_the_calendar(tmp_path: Path) -> None:
+    """Which the gateway makes events of: the clock may have been set back since the others ended."""
+    in_an_hour_ms = time.time_ns() // 1_000_000 + 3_600_000
+    for ordinal in range(1, NEWEST_ENDED + 1):
+        folder = tmp_path / "recordings" / new_id(2e9 + ordinal)
+        folder.mkdir(parents=True)
+        Manifest(
+            id=folder.name,
+            ordinal=ordinal,
+            kind=Kind.MANUAL,
+            state=RecordingState.COMPLETE,
+            ended_unix_ms=in_an_hour_ms,
+        ).write(folder)
+    async with running_recorder(tmp_path) as running:
+        await running.operations.start("1", StartOptions())
+        done = (await running.operations.stop("2", "")).recording
+        assert done
+        assert running.status_reader.recently_ended[0].id == done.id
 
 
 async def test_the_ring_is_written_and_its_topics_are_taken_only_once_it_is_open(

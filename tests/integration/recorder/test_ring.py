@@ -3,6 +3,7 @@
 import errno
 import os
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -49,6 +50,21 @@ def test_where_there_are_no_links_it_is_a_copy(
     link(source, target)
     assert target.read_bytes() == b"a segment"
     assert not target.samefile(source)
+
+
+def test_what_a_clock_that_was_set_back_has_in_the_future_is_kept_no_longer(tmp_path: Path) -> None:
+    """A computer without a clock of its own starts with the time of its last shutdown, or an older one."""
+    writer = SegmentWriter(tmp_path / "00000007.mcap.part")
+    later_ns = time.time_ns() + 3600 * NS_PER_S
+    writer.write(replace(string_sample(1), log_time_ns=later_ns))
+    writer.finish()
+    ring = Ring(tmp_path, seconds=60)
+    ring.load()
+    now_ns = time.monotonic_ns()
+    assert 0 <= ring.held_ns(now_ns) <= 60 * NS_PER_S
+    assert ring.outdated(now_ns + 59 * NS_PER_S) == []
+    assert ring.outdated(now_ns + 61 * NS_PER_S) == ring.segments
+    assert ring.within(now_ns - 30 * NS_PER_S, now_ns) == [], "it is not what has just been"
 
 
 def test_what_was_left_an_hour_ago_is_kept_as_long_as_what_is_new(tmp_path: Path) -> None:

@@ -2,6 +2,8 @@
 
 import asyncio
 import hashlib
+import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +13,10 @@ import pytest
 from omniseer.gateway.v1 import fault_pb2
 from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
+from recorder.mcap.writer import SegmentWriter
 from tests.support.recorder_in_process import Source
 from tests.support.refusals import refused
+from tests.support.segments import string_sample
 from tests.support.served_recorder import exported, served
 
 
@@ -201,6 +205,20 @@ async def test_snapshots_and_incidents(tmp_path: Path) -> None:
         await robot.stub.SetCopy(copy)
         asked = pb.GetRecordingRequest(recording_id=incident.recording_id)
         assert (await robot.stub.GetRecording(asked)).recording.copy.state == queued.state
+
+
+async def test_after_a_start_with_an_old_time_the_state_can_be_had(tmp_path: Path) -> None:
+    """The ring's files are of the future then: its length was negative, which no message takes."""
+    ring = tmp_path / "root" / "ring"
+    ring.mkdir(parents=True)
+    writer = SegmentWriter(ring / "00000000.mcap.part")
+    writer.write(replace(string_sample(1), log_time_ns=time.time_ns() + 3600 * 10**9))
+    writer.finish()
+    async with served(tmp_path, ring={"preset": "all"}) as robot:
+        states = robot.stub.WatchState(recorder_pb.WatchStateRequest())
+        state = await anext(aiter(states))
+        assert 0 <= state.status.ring_s <= robot.running.settings.ring.seconds
+        assert (await robot.stub.ListRecordings(pb.ListRecordingsRequest())).status.presets
 
 
 async def test_a_start_that_makes_no_sense(tmp_path: Path) -> None:
