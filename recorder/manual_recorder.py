@@ -194,15 +194,14 @@ class ManualRecorder:
         duration_ms = self._duration_ms(manifest)
         output = self._outputs.recording if self.running and self.running.id == manifest.id else None
         if output is None:
-            return Live(duration_ms, manifest.messages, manifest.video_frames, manifest.lost)
+            return Live(duration_ms, manifest.messages, manifest.video_frames, manifest.losses)
         before = manifest.before(output.shape.first)
         progress = output.progress
-        lost = progress.lost if progress.numbered and before.lost is not None else None
         return Live(
             duration_ms,
             before.messages + progress.messages,
             before.video_frames + progress.frames,
-            None if lost is None else lost + (before.lost or 0),
+            before.losses + progress.losses,
             segment_name(int(progress.part.stem)) if progress.part else "",
             progress.part_bytes,
         )
@@ -240,6 +239,6 @@ def _at_end(manifest: Manifest, progress: Progress) -> Manifest:
         update={
             "ended_unix_ms": time.time_ns() // _NS_PER_MS,
             "ended_monotonic_ns": time.monotonic_ns(),
-            "numbered": manifest.numbered and progress.numbered,
+            "numbered": manifest.numbered and progress.losses.numbered,
         }
     )

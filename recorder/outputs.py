@@ -2,6 +2,7 @@
 
 from typing import Final, Protocol
 
+from recorder.values import Losses
 from recorder.writing.output import Output
 
 _RATE_EVERY_S: Final = 2.0
@@ -64,11 +65,14 @@ class Outputs:
         return [each for each in (self._recording, self._ring) if each]
 
     @property
-    def lost(self) -> int | None:
-        """Messages lost, of the output that has lost more; None where an output can't know."""
-        counts = [each.progress.lost if each.progress.numbered else None for each in self.all]
-        known = [count for count in counts if count is not None]
-        return None if len(known) < len(counts) else max(known, default=0)
+    def losses(self) -> Losses:
+        """What is missing, each by the output that lacks more of it."""
+        found = [each.progress.losses for each in self.all]
+        return Losses(
+            max((each.messages for each in found), default=0),
+            max((each.uncounted for each in found), default=0),
+            all(each.numbered for each in found),
+        )
 
     def measure(self, now_s: float) -> None:
         """Measures the rate, every 2 s.

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from recorder.store.manifest import Manifest
+from recorder.values import Losses
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,11 +38,11 @@ class Result:
 
 @dataclass(frozen=True, slots=True)
 class Live:
-    """How far a recording has come. `lost` is None if unknown; `part` is the name of the unfinished file."""
+    """How far a recording has come. `part` is the name of the unfinished file."""
 
     duration_ms: int
     messages: int
     frames: int
-    lost: int | None
+    losses: Losses
     part: str = ""
     part_bytes: int = 0

@@ -21,7 +21,7 @@ from recorder.store.housekeeping import Housekeeping, attempt
 from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason
 from recorder.store.ring import SEGMENT_S, Ring, RingSegment, link_next
 from recorder.store.salvage import ended
-from recorder.values import GapCause
+from recorder.values import Gap, GapCause
 from recorder.writing.output import Closed, Output, Shape
 from recorder.writing.writer import Writer
 
@@ -303,9 +303,7 @@ class RingRecorder:
     def _at_end(self, manifest: Manifest) -> Manifest:
         """Returns the manifest with the begin of what it contains, which may be later than was requested."""
         now_ms, now_ns = time.time_ns() // _NS_PER_MS, time.monotonic_ns()
-        output = self._outputs.ring
-        numbered = output.progress.numbered if output else manifest.numbered
-        update: dict[str, Any] = {"ended_unix_ms": now_ms, "ended_monotonic_ns": now_ns, "numbered": numbered}
+        update: dict[str, Any] = {"ended_unix_ms": now_ms, "ended_monotonic_ns": now_ns}
         if manifest.window_ns:
             update["gaps"] = (*manifest.gaps, *self._outages.within(*manifest.window_ns, time.time_ns()))
         # The calendar clock may have been set meanwhile: the earliest time need not be the first message's.
@@ -338,9 +336,17 @@ class RingRecorder:
                 )
                 if linked:
                     snapshot.takes(segment)
-                    await self._keep(linked)
+                await self._keep(linked or _lacking(manifest, segment))
 
     async def _keep(self, manifest: Manifest) -> None:
         await attempt(
             f"the manifest of {manifest.id} is not on the disk", lambda: self._catalogue.write(manifest)
         )
+
+
+def _lacking(manifest: Manifest, segment: RingSegment) -> Manifest:
+    """Returns a snapshot's manifest with a gap for a segment that the disk has refused it."""
+    summary = segment.summary
+    first_ns = summary.first_ns or 0
+    gap = Gap("", GapCause.DISK, first_ns, summary.last_ns or first_ns, summary.messages)
+    return manifest.model_copy(update={"gaps": (*manifest.gaps, gap)})

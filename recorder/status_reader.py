@@ -12,6 +12,7 @@ from recorder.lifecycle import Phase
 from recorder.requests import Live
 from recorder.store.housekeeping import LEAST_ROOM, Room
 from recorder.store.manifest import Manifest
+from recorder.values import Losses
 
 NEWEST_ENDED: Final = 16
 _SHORT_S: Final = 3600.0
@@ -150,9 +151,9 @@ class StatusReader:
         return self._parts.queue.dropped
 
     @property
-    def lost(self) -> int | None:
-        """Messages lost by what is written at present, where that is known."""
-        return self._parts.outputs.lost
+    def losses(self) -> Losses:
+        """What is missing from what is written at present."""
+        return self._parts.outputs.losses
 
     def live(self, manifest: Manifest) -> Live:
         """Returns how far a recording has come, including what of it is not final yet."""

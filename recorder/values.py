@@ -4,7 +4,7 @@ Times in nanoseconds count from 1970-01-01 UTC by the calendar clock, unless a n
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 from typing import Final
@@ -121,6 +121,41 @@ class Gap:
 
 
 @dataclass(frozen=True, slots=True)
+class Losses:
+    """How much is missing.
+
+    Attributes:
+        messages: as far as they were counted.
+        uncounted: gaps of which it is unknown how many messages they lost, those of the video aside.
+        numbered: whether the middleware numbers the messages, so that they can be counted.
+    """
+
+    messages: int = 0
+    uncounted: int = 0
+    numbered: bool = True
+
+    @property
+    def counted(self) -> int | None:
+        """Messages lost as far as they were counted; None where 0 would say that nothing is missing."""
+        if not self.numbered or (self.uncounted and not self.messages):
+            return None
+        return self.messages
+
+    def with_loss(self, cause: GapCause, messages: int | None) -> "Losses":
+        """Returns the losses with one more; None: it is unknown how many messages."""
+        if messages is not None:
+            return replace(self, messages=self.messages + messages)
+        return self if cause is GapCause.VIDEO else replace(self, uncounted=self.uncounted + 1)
+
+    def __add__(self, other: "Losses") -> "Losses":
+        return Losses(
+            self.messages + other.messages,
+            self.uncounted + other.uncounted,
+            self.numbered and other.numbered,
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class SegmentSummary:
     """What a finished segment contains."""
 
@@ -138,3 +173,5 @@ class SegmentSummary:
     """Latest log time."""
     gaps: tuple[Gap, ...]
     """In the order in which they were recorded."""
+    numbered: bool = True
+    """Whether all of its messages are numbered, those of the video aside."""

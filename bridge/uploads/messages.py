@@ -33,6 +33,7 @@ def recording_message(recording: results.Recording) -> wire.Recording:
         size=sum(file.size for file in recording.files),
         messages_written=recording.messages_written,
         messages_lost=recording.messages_lost,
+        uncounted_gaps=recording.uncounted_gaps,
         video_frames=recording.video_frames,
         trigger=recording.trigger,
         pinned=recording.pinned,

@@ -348,7 +348,7 @@ def _view(recording: Recording) -> RenderableType:
         ("ended", ended),
         ("length", age(recording.duration_ms)),
         ("size", size(recording.size)),
-        ("messages", f"{recording.messages_written}, {_lost(recording.messages_lost)}"),
+        ("messages", f"{recording.messages_written}, {_losses(recording)}"),
         ("video", plural(recording.video_frames, "frame") if recording.video_frames else "none"),
         ("", remarks(recording)),
         ("copy", joined(copy_text(recording.copy, recording.size), recording.copy.reason)),
@@ -366,6 +366,15 @@ def _view(recording: Recording) -> RenderableType:
             Text("gap", style="bold yellow"), Text(when), f"{gap.cause.value}, {_lost(gap.messages)}"
         )
     return Group(Text(recording.id, style="bold"), Text(), facts, Text(), files, gaps)
+
+
+def _losses(recording: Recording) -> str:
+    """Returns what is missing in all; where gaps could not be counted, never that nothing is."""
+    uncounted = recording.uncounted_gaps
+    gaps = plural(uncounted, "gap") + " of unknown size" if uncounted else ""
+    if gaps and recording.messages_lost == 0:
+        return gaps
+    return joined(_lost(recording.messages_lost), gaps)
 
 
 def _lost(messages: int | None) -> str:

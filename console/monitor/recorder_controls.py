@@ -18,7 +18,7 @@ from console.monitor.recordings import Asked, Change, ExportState, ExportView, R
 from console.presentation.cloud import copy_text
 from console.presentation.formatting import age, joined, plural, size, wall_clock
 from console.presentation.preview_switch import Note
-from console.presentation.recording import is_written, marks, recorder_mark, recording_state, remarks
+from console.presentation.recording import is_written, lost, marks, recorder_mark, recording_state, remarks
 from console.presentation.severity_style import FAULT_STYLES, SeverityStyle
 from console.presentation.value_style import of_recorder
 
@@ -216,7 +216,7 @@ def _running(status: RecordingStatus) -> str:
         size(status.size),
         "with video" if status.video else "without video",
         status.label or status.preset,
-        plural(status.messages_lost, "message") + " lost" if status.messages_lost else "",
+        lost(status),
     )
 
 

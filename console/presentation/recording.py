@@ -33,13 +33,21 @@ def recording_summary(status: RecordingStatus, *, compact: bool) -> str:
     )
     return joined(
         runs if status.recording_id else "",
-        plural(status.messages_lost, "message") + " lost" if status.messages_lost else "",
+        lost(status),
         room(status),
         "" if compact or not status.ring_s else f"the last {status.ring_s} s kept",
         plural(status.snapshots_pending, "snapshot") + " pending" if status.snapshots_pending else "",
         "" if compact else plural(status.recordings, "recording"),
         f"{status.to_copy} to copy" if status.to_copy and not compact else "",
         status.last_error,
+    )
+
+
+def lost(status: RecordingStatus) -> str:
+    """Returns what is missing from the recording that runs; empty if nothing is."""
+    return joined(
+        plural(status.messages_lost, "message") + " lost" if status.messages_lost else "",
+        plural(status.uncounted_gaps, "gap") + " of unknown size" if status.uncounted_gaps else "",
     )
 
 
@@ -79,7 +87,14 @@ def marks(recording: Recording) -> str:
     """Returns what has become of a recording: pinned, incomplete, and why it was made."""
     return joined(
         "pinned" if recording.pinned else "",
-        plural(recording.gap_count, "gap") if recording.gap_count else "",
+        _gaps(recording),
         plural(recording.messages_lost, "message") + " lost" if recording.messages_lost else "",
         recording.trigger,
     )
+
+
+def _gaps(recording: Recording) -> str:
+    if not recording.gap_count:
+        return ""
+    uncounted = f" ({recording.uncounted_gaps} of unknown size)" if recording.uncounted_gaps else ""
+    return plural(recording.gap_count, "gap") + uncounted

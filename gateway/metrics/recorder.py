@@ -40,8 +40,12 @@ def of_recording(view: RecorderView, recorder: RecorderMetrics) -> Iterator[Metr
     yield gauge("recording_room_bytes", "May still be written.", status.room_bytes)
     yield gauge("recordings", "Recordings on the disk.", status.recordings)
     if report.messages_lost is not None:
-        lost = "Messages that the middleware lost before the recorder took them."
+        lost = "Messages lost from what is recorded at present, as far as they were counted."
         yield counter("recording_messages_lost", lost, report.messages_lost)
+    uncounted = "Gaps of unknown size in what is recorded at present."
+    yield counter("recording_uncounted_gaps", uncounted, report.uncounted_gaps)
+    ring = "Attempts to write the ring that failed in a row."
+    yield gauge("recording_ring_failures", ring, report.ring_failures)
     dropped = "Messages dropped because the disk was too slow."
     yield counter("recording_messages_dropped", dropped, report.messages_dropped)
     yield gauge("recording_disk_free_bytes", "Free on its file system.", report.disk_free_bytes)

@@ -67,6 +67,7 @@ def _recorder(view: RecorderView | None) -> object:
         status.label,
         status.preset,
         status.messages_lost,
+        status.uncounted_gaps,
         status.video,
         status.snapshots_pending,
         status.recordings,

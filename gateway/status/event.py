@@ -152,7 +152,8 @@ class RecordingChanged:
 
     Attributes:
         kind, state, stop_reason: None where they are not known, and before the end.
-        messages_lost: so far; None if unknown.
+        messages_lost: so far, as far as they were counted; None if unknown.
+        uncounted_gaps: gaps of unknown size so far.
     """
 
     change: RecordingChange
@@ -162,6 +163,7 @@ class RecordingChanged:
     state: RecordingState | None = None
     stop_reason: RecordingStopReason | None = None
     messages_lost: int | None = None
+    uncounted_gaps: int = 0
 
 
 @dataclass(frozen=True, slots=True)

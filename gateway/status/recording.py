@@ -88,7 +88,8 @@ class RecorderStatus:
 
     Attributes:
         state: as it reports.
-        messages_lost: None where the middleware does not number messages.
+        messages_lost: as far as they were counted; None where it is unknown how many.
+        uncounted_gaps: gaps of unknown size, which are not in it.
         room_s: None while nothing is written.
     """
 
@@ -100,6 +101,7 @@ class RecorderStatus:
     size: int = 0
     messages_written: int = 0
     messages_lost: int | None = None
+    uncounted_gaps: int = 0
     video: bool = False
     bytes_per_s: int = 0
     room_bytes: int = 0
@@ -126,6 +128,7 @@ class RecordingBrief:
     state: RecordingState | None
     stop_reason: RecordingStopReason | None
     messages_lost: int | None
+    uncounted_gaps: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,15 +143,21 @@ class RecorderReport:
     status: RecorderStatus
     ended: tuple[RecordingBrief, ...] = ()
     messages_lost: int | None = None
+    uncounted_gaps: int = 0
     messages_dropped: int = 0
+    ring_failures: int = 0
     disk_free_bytes: int = 0
     disk_size_bytes: int = 0
     disk_short: bool = False
 
     @property
     def missing(self) -> int:
-        """Messages lost or dropped since its process started, as far as that is known."""
+        """Messages lost or dropped, as far as they were counted."""
         return (self.messages_lost or 0) + self.messages_dropped
+
+    def lacks_more_than(self, before: "RecorderReport") -> bool:
+        """Returns whether messages are missing that an earlier report of the same process did not know of."""
+        return self.missing > before.missing or self.uncounted_gaps > before.uncounted_gaps
 
 
 @dataclass(frozen=True, slots=True)

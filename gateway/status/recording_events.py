@@ -25,6 +25,9 @@ _SEVERITIES: Final = {
     RecordingStopReason.INTERRUPTED: Severity.WARNING,
 }
 """Of an end by this reason; INFO for the others."""
+_Lost = tuple[int, int]
+"""Messages as far as they were counted, and gaps of unknown size."""
+_NOTHING: Final[_Lost] = (0, 0)
 
 
 class RecordingEvents:
@@ -34,7 +37,7 @@ class RecordingEvents:
         self._ended: frozenset[str] | None = None
         """IDs of the recordings that had ended; None before the first report."""
         self._running = ""
-        self._lost = 0
+        self._lost = _NOTHING
         self._lost_s: float | None = None
         """When the newest loss was reported, as of an event or of one that was left out."""
 
@@ -46,7 +49,7 @@ class RecordingEvents:
         self._ended = frozenset(each.id for each in report.ended)
         started = self._take_running(report.status)
         if before is None:
-            self._lost = report.status.messages_lost or 0
+            self._lost = _lost(report.status)
             return
         for each in reversed(report.ended):
             if each.id not in before and each.kind is not RecordingKind.RUN_BUNDLE:
@@ -59,25 +62,45 @@ class RecordingEvents:
         """Returns whether another recording runs than before."""
         started = bool(status.recording_id) and status.recording_id != self._running
         if status.recording_id != self._running:
-            self._running, self._lost = status.recording_id, 0
+            self._running, self._lost = status.recording_id, _NOTHING
         return started
 
     def _losses(self, report: RecorderReport, now_s: float) -> Iterator[Event]:
         status = report.status
-        if not status.recording_id or (status.messages_lost or 0) <= self._lost:
+        before, self._lost = self._lost, _lost(status)
+        if not status.recording_id or not _exceeds(self._lost, before):
             return
-        self._lost = status.messages_lost or 0
         recent = self._lost_s is not None and now_s - self._lost_s < _LOSS_SPACING_S
         self._lost_s = now_s
         if not recent:
-            sentence = f"{_named(status.recording_id, status.label)} loses messages: {self._lost} so far"
+            sentence = f"{_named(status.recording_id, status.label)} loses messages: {_amount(self._lost)}"
             yield _event(
                 Severity.WARNING,
                 sentence,
                 RecordingChanged(
-                    RecordingChange.LOSS, status.recording_id, status.label, messages_lost=self._lost
+                    RecordingChange.LOSS,
+                    status.recording_id,
+                    status.label,
+                    messages_lost=status.messages_lost,
+                    uncounted_gaps=status.uncounted_gaps,
                 ),
             )
+
+
+def _lost(status: RecorderStatus) -> _Lost:
+    return status.messages_lost or 0, status.uncounted_gaps
+
+
+def _exceeds(lost: _Lost, before: _Lost) -> bool:
+    return any(now > then for now, then in zip(lost, before, strict=True))
+
+
+def _amount(lost: _Lost) -> str:
+    messages, gaps = lost
+    uncounted = f"{gaps} gap{'' if gaps == 1 else 's'} of unknown size"
+    if not gaps:
+        return f"{messages} so far"
+    return f"{messages} so far, and {uncounted}" if messages else f"{uncounted} so far"
 
 
 def _start(status: RecorderStatus) -> Event:
@@ -85,7 +108,11 @@ def _start(status: RecorderStatus) -> Event:
         Severity.INFO,
         f"{_named(status.recording_id, status.label)} started, preset {status.preset}",
         RecordingChanged(
-            RecordingChange.STARTED, status.recording_id, status.label, messages_lost=status.messages_lost
+            RecordingChange.STARTED,
+            status.recording_id,
+            status.label,
+            messages_lost=status.messages_lost,
+            uncounted_gaps=status.uncounted_gaps,
         ),
     )
 
@@ -100,7 +127,14 @@ def _end(brief: RecordingBrief) -> Event:
     change = RecordingChange.SNAPSHOT_COMPLETE if whole else RecordingChange.ENDED
     severity = _SEVERITIES.get(why, Severity.INFO) if why else Severity.INFO
     detail = RecordingChanged(
-        change, brief.id, brief.label, brief.kind, brief.state, why, brief.messages_lost
+        change,
+        brief.id,
+        brief.label,
+        brief.kind,
+        brief.state,
+        why,
+        brief.messages_lost,
+        brief.uncounted_gaps,
     )
     return _event(severity, text, detail)
 

@@ -66,6 +66,13 @@ def program_findings(state: recorder_pb.WatchStateResponse) -> Iterator[Finding]
             "They are missing from recordings, which say so",
             "Let their publishers offer reliable QoS, or a longer history",
         )
+    if state.uncounted_gaps:
+        yield note(
+            "recorder.gaps",
+            f"what is recorded has gaps of unknown size, {state.uncounted_gaps} so far",
+            "Messages are missing, and nothing says how many",
+            "Their causes and times: robotctl record show ID",
+        )
 
 
 def preset_findings(

@@ -4,7 +4,8 @@ DDS numbers the messages of each publisher (DDSI-RTPS 8.3.5.4). rclpy hands the 
 publisher. Of one publisher the count is exact. Of several, each number is taken for the next of the sequence
 that it fits best: exact while their numbers are apart, close otherwise, and 0 where nothing was lost. When
 publishers have come or gone, the numbers since they were looked at last are gone through once more, as of all
-that there were meanwhile. How many are missing is unknown while nothing is known of the publishers.
+that there were meanwhile. How many are missing is unknown while nothing is known of the publishers, and where
+one was started again without the graph showing another one: how far the former one had come is not known.
 """
 
 from collections.abc import Hashable
@@ -55,6 +56,10 @@ class LossCounter:
     def __init__(self) -> None:
         self._sequences: list[_Sequence] = []
         self._missing: list[_Missing] = []
+        self._restarts: list[tuple[int, int]] = []
+        """Log times of the messages around each: nothing says how many are missing of the former one."""
+        self._surplus = 0
+        """Sequences that were forgotten while other publishers stayed: it may have been one of theirs."""
         self._publishers: frozenset[Hashable] = frozenset()
         self._expected = 1
         """How many publishers there are, as far as is known."""
@@ -89,6 +94,10 @@ class LossCounter:
         elif not self._found(number):
             # Lower than all, and not late: a publisher that was started again.
             oldest = min(self._sequences, key=lambda each: each.at_ns)
+            if self._surplus:
+                self._surplus -= 1  # Or one whose sequence was taken for that of a publisher that has gone.
+            elif len(self._restarts) < _MAX_RANGES:
+                self._restarts.append((oldest.at_ns, at_ns))
             oldest.last, oldest.at_ns = number, at_ns
 
     def collect(self, publishers: frozenset[Hashable] | None) -> Lost | None:
@@ -104,28 +113,33 @@ class LossCounter:
                 self._go_through_again(publishers | self._publishers)
             self._expect(publishers)
         missing, self._missing = self._missing, []
+        restarts, self._restarts = self._restarts, []
         self._before = [replace(each) for each in self._sequences]
         self._recent.clear()
-        if not missing:
+        times = [*((each.began_ns, each.ended_ns) for each in missing), *restarts]
+        if not times:
             return None
         return Lost(
-            messages=sum(each.last - each.first + 1 for each in missing) if exact else None,
-            began_ns=min(each.began_ns for each in missing),
-            ended_ns=max(each.ended_ns for each in missing),
+            messages=sum(each.last - each.first + 1 for each in missing) if exact and not restarts else None,
+            began_ns=min(began_ns for began_ns, _ in times),
+            ended_ns=max(ended_ns for _, ended_ns in times),
         )
 
     def _go_through_again(self, publishers: frozenset[Hashable]) -> None:
         """Takes what has come since the last `collect` for messages of these publishers."""
-        self._sequences, self._missing = self._before, []
+        self._sequences, self._missing, self._restarts = self._before, [], []
         self._expected = _bounded(len(publishers))
         for number, at_ns in self._recent:
             self._take(number, at_ns)
 
     def _expect(self, publishers: frozenset[Hashable]) -> None:
         """Knows the publishers from now on; forgets the oldest sequences of those that have gone."""
+        stay = bool(publishers & self._publishers)
         self._publishers, self._expected = publishers, _bounded(len(publishers))
+        surplus = max(0, len(self._sequences) - self._expected)
         self._sequences.sort(key=lambda each: each.at_ns)
-        del self._sequences[: max(0, len(self._sequences) - self._expected)]
+        del self._sequences[:surplus]
+        self._surplus = surplus if stay else 0
 
     def _found(self, number: int) -> bool:
         """Removes a number from the missing ones; returns whether it was one."""

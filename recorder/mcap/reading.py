@@ -11,7 +11,7 @@ import zstandard
 from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
 
-from recorder.mcap.records import GAP, OFFERED_QOS, gap_of_note
+from recorder.mcap.records import OFFERED_QOS, UNNUMBERED, gap_of_note
 from recorder.values import ChannelSummary, Note, SegmentSummary
 
 _DAMAGES: Final = (
@@ -67,7 +67,7 @@ def _summary(path: Path, file: BufferedReader) -> SegmentSummary | None:
         )
         for number, channel in index.channels.items()
     )
-    notes = (Note(record.name, record.metadata) for record in reader.iter_metadata() if record.name == GAP)
+    notes = [Note(record.name, record.metadata) for record in reader.iter_metadata()]
     gaps = tuple(gap for note in notes if (gap := gap_of_note(note)))
     file.seek(0)
     content = hashlib.file_digest(file, "sha256")
@@ -81,4 +81,5 @@ def _summary(path: Path, file: BufferedReader) -> SegmentSummary | None:
         first_ns=statistics.message_start_time if count else None,
         last_ns=statistics.message_end_time if count else None,
         gaps=gaps,
+        numbered=all(note.name != UNNUMBERED for note in notes),
     )

@@ -1,4 +1,4 @@
-"""What the recorder's segments hold besides messages: their names, and gaps as metadata records."""
+"""What the recorder's segments hold besides messages: names, and what is missing as metadata records."""
 
 from collections.abc import Iterable
 from typing import Final
@@ -18,6 +18,8 @@ PART: Final = ".part"
 """Suffix of a segment that still grows."""
 GAP: Final = "gap"
 """Name of the metadata record of a gap."""
+UNNUMBERED: Final = "unnumbered"
+"""Name of the metadata record of a file with messages that the middleware has not numbered."""
 
 
 def note_of_gap(gap: Gap) -> Note:

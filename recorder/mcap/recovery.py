@@ -21,7 +21,7 @@ from typing import BinaryIO, Final
 
 from mcap.records import Channel, Metadata
 
-from recorder.mcap.records import CDR, OFFERED_QOS, bytes_of, gap_of_note, note_of_gap
+from recorder.mcap.records import CDR, OFFERED_QOS, UNNUMBERED, bytes_of, gap_of_note, note_of_gap
 from recorder.mcap.scan import RECORD, Contents, NoteRecord, new_head, scan
 from recorder.mcap.summary_section import ending
 from recorder.mcap.writer import move_into_place
@@ -63,6 +63,7 @@ def recover(part: Path) -> SegmentSummary | None:
         first_ns=min(each.first_ns for each in found.chunks),
         last_ns=max(each.last_ns for each in found.chunks),
         gaps=gaps,
+        numbered=all(each.note.name != UNNUMBERED for each in found.notes),
     )
 
 

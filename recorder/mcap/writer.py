@@ -16,8 +16,17 @@ from mcap.writer import CompressionType, Writer
 
 from common.private_files import sync_directory
 from common.version import project_version
-from recorder.mcap.records import CDR, OFFERED_QOS, PART, PROFILE, note_of_gap
-from recorder.values import Channel, ChannelSummary, Gap, Loss, Note, Sample, SegmentSummary
+from recorder.mcap.records import CDR, OFFERED_QOS, PART, PROFILE, UNNUMBERED, note_of_gap
+from recorder.values import (
+    VIDEO_TOPIC,
+    Channel,
+    ChannelSummary,
+    Gap,
+    Loss,
+    Note,
+    Sample,
+    SegmentSummary,
+)
 
 MAX_CHUNK: Final = 1024 * 1024
 """Uncompressed bytes of a chunk; a larger message is a chunk of its own."""
@@ -54,6 +63,7 @@ class SegmentWriter:
         self._last_ns: int | None = None
         self._messages = 0
         self._gaps: list[Gap] = []
+        self._numbered = True
         try:
             self._mcap.start(profile=PROFILE, library=f"robot-gateway {project_version()}")
             for each in head:
@@ -73,6 +83,10 @@ class SegmentWriter:
         """Adds a message; a full chunk goes to the file."""
         if self._pending and self._pending + len(sample.data) > MAX_CHUNK:
             self._end_chunk()
+        if self._numbered and not sample.sequence and sample.channel.topic != VIDEO_TOPIC:
+            # Before the message itself is on the disk: what is recovered says it, too.
+            self._numbered = False
+            self.note(Note(UNNUMBERED, {"topic": sample.channel.topic}))
         channel, at_ns = sample.channel, min(max(sample.log_time_ns, 0), _MAX_TIME_NS)
         published_ns = sample.publish_time_ns
         if not 0 <= published_ns <= _MAX_TIME_NS:
@@ -135,6 +149,7 @@ class SegmentWriter:
             first_ns=self._first_ns,
             last_ns=self._last_ns,
             gaps=tuple(self._gaps),
+            numbered=self._numbered,
         )
 
     def abandon(self) -> None:

@@ -84,8 +84,9 @@ def recording(status_reader: StatusReader, manifest: Manifest, *, whole: bool = 
         gap_count=len(gaps),
         sha256=manifest.sha256,
     )
-    if live.lost is not None:
-        message.messages_lost = live.lost
+    message.uncounted_gaps = live.losses.uncounted
+    if (lost := live.losses.counted) is not None:
+        message.messages_lost = lost
     if whole:
         message.files.extend(_files(manifest, live)[:10_000])
         message.gaps.extend(_gap(each) for each in gaps)
@@ -148,8 +149,9 @@ def status(status_reader: StatusReader, settings: RecorderSettings) -> pb.Record
         message.size = running.size + live.part_bytes
         message.messages_written = live.messages
         message.video = live.frames > 0
-        if live.lost is not None:
-            message.messages_lost = live.lost
+        message.uncounted_gaps = live.losses.uncounted
+        if (lost := live.losses.counted) is not None:
+            message.messages_lost = lost
     return message
 
 
@@ -165,9 +167,10 @@ def watch_state(status_reader: StatusReader, settings: RecorderSettings) -> reco
         disk_size_bytes=status_reader.room.disk.size_bytes,
         disk_short=status_reader.disk_short,
         ended=[recording(status_reader, each) for each in status_reader.recently_ended],
+        uncounted_gaps=status_reader.losses.uncounted,
         ring_failures=status_reader.ring_failures,
     )
-    if (lost := status_reader.lost) is not None:
+    if (lost := status_reader.losses.counted) is not None:
         message.messages_lost = lost
     return message
 

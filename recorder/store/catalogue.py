@@ -235,10 +235,16 @@ def _rebuilt(folder: Path, why: str) -> Manifest | None:
         # Whether it was pinned or had to be copied is lost with the manifest.
         pinned=True,
     )
+    damaged = []
     for path in finals:
+        name = f"{DATA}/{path.name}"
         if summary := readable(path):
-            manifest = manifest.with_segment(f"{DATA}/{path.name}", summary)
+            manifest = manifest.with_segment(name, summary)
+        else:
+            damaged.append(name)
     manifest = manifest.spanning()
+    for name in damaged:
+        manifest = manifest.without_segment(name)
     try:
         manifest.write(folder)
     except OSError as error:

@@ -2,7 +2,8 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Final, Self
@@ -11,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from recorder.mcap.records import note_of_gap
 from recorder.store.folder import ID, MANIFEST, SEGMENT, replace_file, segment_number
-from recorder.values import VIDEO_TOPIC, ChannelSummary, Gap, GapCause, SegmentSummary
+from recorder.values import VIDEO_TOPIC, ChannelSummary, Gap, GapCause, Losses, SegmentSummary
 
 MAX_GAPS: Final = 1000
 _NS_PER_MS: Final = 1_000_000
@@ -111,6 +112,7 @@ class Segment(File):
     counts: Mapping[int, int] = {}
     """Messages by topic: by its position in the manifest, which names each topic once."""
     gaps: tuple[Gap, ...] = ()
+    numbered: bool = True
 
     @property
     def messages(self) -> int:
@@ -127,7 +129,7 @@ class Manifest(_Part):
             said; 0 if unknown.
         trigger: who or what caused a snapshot or an incident.
         max_duration_s, max_bytes: where it stops by itself; 0 for no limit.
-        numbered: whether the middleware numbers the messages, so that losses can be counted.
+        numbered: whether the middleware numbers the messages, as far as the segments do not say it.
         gaps: besides those of the segments.
         metadata: rosbag2's file, once the recording has ended.
         window_ns: of a snapshot, what it is to contain: two instants of the calendar clock.
@@ -191,16 +193,24 @@ class Manifest(_Part):
     @property
     def all_gaps(self) -> tuple[Gap, ...]:
         """Its gaps in order, at most 1000; further ones are merged with the last."""
-        found = [*self.gaps, *(gap for segment in self.segments for gap in segment.gaps)]
+        found = list(self._gaps)
         found.sort(key=lambda gap: (gap.began_ns, gap.ended_ns))
         return tuple(bounded(found))
 
     @property
-    def lost(self) -> int | None:
-        """Messages lost from its final segments; None if unknown."""
-        gaps = self.all_gaps
-        counted = all(gap.messages is not None for gap in gaps if gap.cause is GapCause.MIDDLEWARE)
-        return sum(gap.messages or 0 for gap in gaps) if self.numbered and counted else None
+    def losses(self) -> Losses:
+        """What is missing from its final segments, by all of its gaps, however many."""
+        numbered = self.numbered and all(segment.numbered for segment in self.segments)
+        found = Losses(numbered=numbered)
+        for gap in self._gaps:
+            found = found.with_loss(gap.cause, gap.messages)
+        return found
+
+    @property
+    def _gaps(self) -> Iterator[Gap]:
+        yield from self.gaps
+        for segment in self.segments:
+            yield from segment.gaps
 
     @property
     def sha256(self) -> bytes:
@@ -245,11 +255,29 @@ class Manifest(_Part):
             last_ns=summary.last_ns,
             counts=counts,
             gaps=summary.gaps,
+            numbered=summary.numbered,
         )
         segments = sorted(
             (*(each for each in self.segments if each.name != name), added), key=lambda each: each.name
         )
         return self.model_copy(update={"topics": tuple(topics), "segments": tuple(segments)})
+
+    def without_segment(self, name: str) -> Self:
+        """Returns the manifest with a gap for an unreadable segment, between the messages beside it.
+
+        It stands for the gap that an earlier look found, when what follows the segment was not there yet.
+        """
+        number = segment_number(name)
+        before = [each.last_ns or 0 for each in self.segments if segment_number(each.name) < number]
+        behind = [each.first_ns for each in self.segments if segment_number(each.name) > number]
+        began_ns = max((each for each in before if each), default=self.started_unix_ms * _NS_PER_MS)
+        ended_ns = min((each for each in behind if each), default=began_ns)
+        gap = Gap("", GapCause.DISK, began_ns, max(began_ns, ended_ns), None)
+        same = [each for each in self.gaps if replace(each, ended_ns=gap.ended_ns) == gap]
+        if any(each.ended_ns >= gap.ended_ns for each in same):
+            return self
+        others = tuple(each for each in self.gaps if each not in same)
+        return self.model_copy(update={"gaps": (*others, gap)})
 
     def before(self, number: int) -> Self:
         """Returns the manifest without the segments from a number on."""
@@ -283,6 +311,7 @@ class Manifest(_Part):
                 first_ns=each.first_ns,
                 last_ns=each.last_ns,
                 gaps=each.gaps,
+                numbered=each.numbered,
             )
             for each in self.segments
         ]

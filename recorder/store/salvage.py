@@ -34,47 +34,41 @@ def whole(folder: Path, manifest: Manifest) -> Manifest:
     known = {segment.name for segment in manifest.segments}
     for path in segments_in(folder):
         name = f"{DATA}/{path.name}"
-        if name not in known and (summary := readable(path)):
-            manifest = manifest.with_segment(name, summary)
+        if name in known:
+            continue
+        summary = readable(path)
+        manifest = manifest.with_segment(name, summary) if summary else manifest.without_segment(name)
     return manifest
 
 
 def _with_part(manifest: Manifest, part: Path) -> Manifest:
     """Returns the manifest with an unfinished segment, or with a gap for one that can't be made whole."""
+    name = f"{DATA}/{part.name.removesuffix(PART)}"
     try:
         summary = recover(part)
-        if summary is None:
-            _clear_away(part)
+        if summary is None and not _clear_away(part):
+            return manifest.without_segment(name)
     except FileExistsError:
         _log.error("%s: another file has its final name; it is kept as %s", part, put_aside(part).name)
-        return _without(manifest, part)
+        return manifest.without_segment(name)
     except OSError as error:
         if is_full(error):
             raise
         _log.error("%s can't be made whole, and is tried again at the next start: %s", part, error.strerror)
-        return _without(manifest, part)
+        return manifest.without_segment(name)
     if summary is None:
         return manifest
     _log.info("recovered %s: %d messages", summary.path, summary.messages)
-    return manifest.with_segment(f"{DATA}/{summary.path.name}", summary)
+    return manifest.with_segment(name, summary)
 
 
-def _clear_away(part: Path) -> None:
-    """Deletes an unfinished segment that nothing was written to; keeps a damaged one aside."""
+def _clear_away(part: Path) -> bool:
+    """Deletes an unfinished segment that is empty, and returns True; keeps a damaged one aside."""
     if is_untouched(part):
         part.unlink()
-    else:
-        _log.warning("%s can't be recovered and is kept as %s", part, put_aside(part).name)
-
-
-def _without(manifest: Manifest, part: Path) -> Manifest:
-    """Returns the manifest with a gap for an unfinished segment: between the messages on both sides of it."""
-    name = f"{DATA}/{part.name.removesuffix(PART)}"
-    before = [each.last_ns for each in manifest.segments if each.name < name and each.last_ns is not None]
-    behind = [each.first_ns for each in manifest.segments if each.name > name and each.first_ns is not None]
-    began_ns = max(before, default=manifest.started_unix_ms * _NS_PER_MS)
-    gap = Gap("", GapCause.DISK, began_ns, max(began_ns, min(behind, default=began_ns)), None)
-    return manifest if gap in manifest.gaps else manifest.model_copy(update={"gaps": (*manifest.gaps, gap)})
+        return True
+    _log.warning("%s can't be recovered and is kept as %s", part, put_aside(part).name)
+    return False
 
 
 def ended(folder: Path, manifest: Manifest, state: RecordingState, reason: StopReason) -> Manifest:

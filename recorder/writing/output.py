@@ -2,13 +2,13 @@
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
 from recorder.mcap.records import PART
 from recorder.mcap.writer import SegmentWriter
-from recorder.values import VIDEO_TOPIC, Channel, GapCause, Item, Loss, Note, Sample, SegmentSummary
+from recorder.values import VIDEO_TOPIC, Channel, Item, Loss, Losses, Note, Sample, SegmentSummary
 
 CLOCK_STEP_NS: Final = 500_000_000
 """A calendar clock that steps by more than this begins a new segment."""
@@ -74,9 +74,7 @@ class Progress:
         part_bytes: its size so far.
         bytes: of all segments.
         messages, frames: written to all segments.
-        lost: messages lost; None if that is unknown.
-        gaps: how many losses were recorded.
-        numbered: whether all messages so far were numbered.
+        losses: what is missing from them.
         last_ns: log time of the newest message; before the first, when the output was opened.
     """
 
@@ -85,9 +83,7 @@ class Progress:
     bytes: int = 0
     messages: int = 0
     frames: int = 0
-    lost: int | None = 0
-    gaps: int = 0
-    numbered: bool = True
+    losses: Losses = field(default=Losses())
     last_ns: int = 0
 
 
@@ -121,9 +117,7 @@ class Output:
         self._closed_bytes = 0
         self._messages = 0
         self._frames = 0
-        self._lost: int | None = 0
-        self._gaps = 0
-        self._numbered = True
+        self._losses = Losses()
         self._last_ns = 0
         self._fresh = True
         """Whether nothing but its head is in the present segment."""
@@ -234,17 +228,13 @@ class Output:
         self._last_ns = sample.log_time_ns
         if sample.channel.topic == VIDEO_TOPIC:
             self._frames += 1
-        elif not sample.sequence:
-            self._numbered = False
+        elif not sample.sequence and self._losses.numbered:
+            self._losses = replace(self._losses, numbered=False)
 
     def _lose(self, loss: Loss) -> None:
         self._opened.loss(loss)
         self._fresh = False
-        self._gaps += 1
-        if loss.messages is None and loss.cause is not GapCause.VIDEO:
-            self._lost = None
-        elif self._lost is not None:
-            self._lost += loss.messages or 0
+        self._losses = self._losses.with_loss(loss.cause, loss.messages)
 
     def _report(self) -> None:
         size = self._segment.size if self._segment else 0
@@ -254,8 +244,6 @@ class Output:
             bytes=self._closed_bytes + size,
             messages=self._messages,
             frames=self._frames,
-            lost=self._lost,
-            gaps=self._gaps,
-            numbered=self._numbered,
+            losses=self._losses,
             last_ns=self._last_ns,
         )

@@ -27,6 +27,7 @@ def status(**more: Any) -> RecorderStatus:
         "size": 7_000_001,
         "messages_written": 9_001,
         "messages_lost": 17,
+        "uncounted_gaps": 13,
         "video": True,
         "bytes_per_s": 1_000_003,
         "room_bytes": 5_000_000_007,

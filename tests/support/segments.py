@@ -27,9 +27,9 @@ def string_cdr(text: str) -> bytes:
 
 
 def string_sample(number: int, text: str = "", channel: Channel = STRING) -> Sample:
-    """Returns a message that is logged and published at `number` ns after 1 s."""
+    """Returns a message that is logged and published at `number` ns after 1 s; DDS counts from 1."""
     at_ns = 1_000_000_000 + number
-    return Sample(channel, string_cdr(text or f"number {number}"), at_ns, at_ns - 1, number, number)
+    return Sample(channel, string_cdr(text or f"number {number}"), at_ns, at_ns - 1, number + 1, number)
 
 
 def unfinished_segment(path: Path, chunks: Sequence[int], *, head: Sequence[Note] = ()) -> Path:

@@ -98,6 +98,8 @@ class RecordingEvent:
     stop_reason: RecordingStopReason
     messages_lost: int | None
     """So far."""
+    uncounted_gaps: int
+    """Gaps of unknown size so far."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

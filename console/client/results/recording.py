@@ -125,6 +125,9 @@ class RecordingStatus:
     size: int
     messages_written: int
     messages_lost: int | None
+    """As far as they were counted; None where it is unknown how many."""
+    uncounted_gaps: int
+    """Gaps of unknown size, which are not in that number."""
     video: bool
     bytes_per_s: int
     """Written at present, the ring included."""
@@ -199,7 +202,9 @@ class Recording:
     size: int
     messages_written: int
     messages_lost: int | None
-    """None where the middleware does not number messages."""
+    """As far as they were counted; None where it is unknown how many."""
+    uncounted_gaps: int
+    """Gaps of unknown size, which are not in that number."""
     video_frames: int
     trigger: str
     """What caused a snapshot or an incident; empty otherwise."""

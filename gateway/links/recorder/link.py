@@ -34,7 +34,7 @@ class RecorderLink(ServiceWatch[RecorderClient, RecorderReport]):
     def _record(self, report: RecorderReport) -> bool:
         before, now_s = self.view, self._clock()
         last = before.report.value if before.report else None
-        loses = last is not None and last.instance_id == report.instance_id and report.missing > last.missing
+        loses = last is not None and last.instance_id == report.instance_id and report.lacks_more_than(last)
         self.view = RecorderView("", Received(report, now_s), now_s if loses else before.lost_s)
         return bool(before.error)
 

@@ -40,4 +40,5 @@ def recording_changed(detail: RecordingChanged) -> event_pb2.RecordingStateChang
         state=RECORDING_STATES[detail.state],
         stop_reason=RECORDING_STOP_REASONS[detail.stop_reason],
         messages_lost=detail.messages_lost,
+        uncounted_gaps=detail.uncounted_gaps,
     )

@@ -308,6 +308,17 @@ async def test_a_damaged_manifest_is_made_anew_and_kept_aside(tmp_path: Path) ->
         assert (folder / "manifest.json.damaged").read_text(encoding="utf-8") == '{"id": 7'
 
 
+async def test_a_damaged_file_beside_a_damaged_manifest_is_a_gap(tmp_path: Path) -> None:
+    async with running_recorder(tmp_path) as running:
+        done = await recorded(running)
+    folder = tmp_path / "recordings" / done.id
+    (folder / "manifest.json").write_text("{", encoding="utf-8")
+    (folder / "data" / "000001.mcap").write_bytes(b"damaged")
+    async with running_recorder(tmp_path) as running:
+        found = running.status_reader.get(done.id)
+        assert (found.messages, found.losses.counted, found.losses.uncounted) == (10, None, 1)
+
+
 async def test_what_is_not_ours_is_neither_listed_nor_deleted(tmp_path: Path) -> None:
     async with running_recorder(tmp_path) as running:
         done = await recorded(running)
@@ -554,6 +565,8 @@ async def test_the_number_of_a_damaged_file_is_not_used_again(tmp_path: Path) ->
         done = (await running.operations.stop("stop", "")).recording
         assert done
         assert [segment.name for segment in done.segments] == ["data/000001.mcap"]
+        assert GapCause.DISK in {gap.cause for gap in done.gaps}, "it is missing, and says so"
+        assert done.losses.counted is None
     assert (data / "000000.mcap").read_bytes() == b"damaged"
 
 

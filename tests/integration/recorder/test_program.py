@@ -62,6 +62,7 @@ def test_killed_while_it_records_it_goes_on_with_the_same_recording(tmp_path: Pa
         program.kill()
         program.start()
         wait_until(lambda: program.state.status.recording_id == recording_id, "it goes on")
+        assert program.state.status.uncounted_gaps >= 1, "what the kill has cost is not counted"
         before = program.state.status.messages_written
         wait_until(partial(arrives, before), "messages arrive again", 60)
         program.call("StopRecording", pb.StopRecordingRequest(request_id="2"))
@@ -69,6 +70,8 @@ def test_killed_while_it_records_it_goes_on_with_the_same_recording(tmp_path: Pa
         assert made.state == pb.RECORDING_STATE_COMPLETE
         causes = {gap.cause for gap in made.gaps}
         assert pb.RECORDING_GAP_CAUSE_INTERRUPTED in causes
+        assert made.uncounted_gaps >= 1
+        assert not made.HasField("messages_lost") or made.messages_lost > 0, "never 0"
         found = numbers(program, made)
         assert found == sorted(set(found))
         assert len([file for file in made.files if file.name.endswith(".mcap")]) >= 2

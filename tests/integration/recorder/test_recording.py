@@ -1,6 +1,8 @@
 """A recording from start to stop, on a real disk, with messages of the test's own."""
 
+import errno
 import json
+import os
 import shutil
 import threading
 import time
@@ -35,7 +37,7 @@ async def test_what_was_sent_is_there_and_rosbags_opens_the_folder(tmp_path: Pat
         assert done
         assert (done.state, done.stop_reason) == (RecordingState.COMPLETE, StopReason.REQUESTED)
         assert numbers(running.status_reader, done) == list(range(6, 106))
-        assert running.status_reader.live(done).lost == 0
+        assert running.status_reader.live(done).losses.counted == 0
         folder = running.status_reader.folder_of(done)
         assert running.sources.presets == frozenset()
     with Reader(folder / "data") as bag:
@@ -144,6 +146,25 @@ async def test_a_snapshot_over_a_step_of_the_clock_is_as_long_as_it_was(tmp_path
         first_ns = done.segments[0].first_ns
         assert first_ns
         assert done.started_unix_ms == first_ns // 1_000_000, "by the clock of its first message"
+
+
+async def test_a_segment_that_the_disk_refuses_a_snapshot_is_a_gap_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
+        await running.until(lambda: running.status_reader.writes)
+        made = await running.operations.snapshot("1", SnapshotOptions(pre_s=10, post_s=1), "someone")
+        assert made.recording
+        Source(running.queue).send(10)
+
+        def broken(_source: Path, _target: Path) -> None:
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+        monkeypatch.setattr(os, "link", broken)
+        await running.until(lambda: not running.status_reader.snapshots_pending)
+        done = running.status_reader.get(made.recording.id)
+        assert (done.messages, done.losses.counted) == (0, 10)
+        assert {gap.cause for gap in done.gaps} == {GapCause.DISK}
 
 
 async def test_what_has_ended_last_is_no_question_of_the_calendar(tmp_path: Path) -> None:

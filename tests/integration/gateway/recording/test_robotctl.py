@@ -74,6 +74,19 @@ async def test_export_and_its_refusals(tmp_path: Path) -> None:
         assert "can't be written" in only_line(read_only.stderr)
 
 
+async def test_what_could_not_be_counted_is_shown_and_never_as_nothing_lost(tmp_path: Path) -> None:
+    double = RecorderDouble()
+    one = double.add({"a": b"1"}, id="one", gap_count=2, uncounted_gaps=1)
+    async with recording_robot(tmp_path, double) as robot:
+        text = (await typed(robot, "show", "one")).stdout
+        assert "losses unknown, 1 gap of unknown size" in text
+        assert "2 gaps (1 of unknown size)" in text
+        one.messages_lost = 5
+        assert "5 lost, 1 gap of unknown size" in (await typed(robot, "show", "one")).stdout
+        shown = await printed(robot, "show", "one")
+        assert (shown["messages_lost"], shown["uncounted_gaps"]) == (5, 1)
+
+
 async def test_the_installed_program_and_the_status(tmp_path: Path) -> None:
     async with recording_robot(tmp_path) as robot:
         await robot.start(label="lap")

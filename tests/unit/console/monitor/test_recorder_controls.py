@@ -107,6 +107,7 @@ def test_a_recording_that_runs_shows_time_size_and_room_at_the_present_rate() ->
     assert (now.tile.word, now.tile.detail, now.tile.style) == ("REC", "room 100 min", SeverityStyle.GOOD)
     assert "without video" in of(replace(RECORDS, video=False)).running
     assert "17 messages lost" in of(replace(RECORDS, messages_lost=17)).running
+    assert of(replace(RECORDS, uncounted_gaps=1)).running.endswith("lap 1, 1 gap of unknown size")
 
 
 def test_idle_the_room_is_that_of_the_chosen_preset() -> None:

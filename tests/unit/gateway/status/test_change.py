@@ -86,6 +86,7 @@ def test_a_recording_that_grows_is_no_change_and_what_an_operator_acts_on_is_one
         status(state=RecorderState.FINALISING),
         status(recording_id="another"),
         status(messages_lost=18),
+        status(uncounted_gaps=14),
         status(last_error="no room"),
         status(snapshots_pending=4),
     ):

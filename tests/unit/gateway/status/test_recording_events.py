@@ -41,7 +41,7 @@ def test_what_was_there_before_is_no_event() -> None:
 
 def test_a_recording_begins_and_ends() -> None:
     events = begun()
-    running = status(recording_id="a", messages_lost=0)
+    running = status(recording_id="a", messages_lost=0, uncounted_gaps=0)
     assert seen(events, running) == [(RecordingChange.STARTED, "a", Severity.INFO)]
     assert seen(events, running) == []
     assert seen(events, idle(), ended=(ended("a"),)) == [(RecordingChange.ENDED, "a", Severity.INFO)]
@@ -50,9 +50,8 @@ def test_a_recording_begins_and_ends() -> None:
 
 def test_one_ends_and_the_next_begins_between_two_looks() -> None:
     events = begun(status(recording_id="a"))
-    assert [
-        each[:2] for each in seen(events, status(recording_id="b", messages_lost=0), ended=(ended("a"),))
-    ] == [
+    following = status(recording_id="b", messages_lost=0, uncounted_gaps=0)
+    assert [each[:2] for each in seen(events, following, ended=(ended("a"),))] == [
         (RecordingChange.ENDED, "a"),
         (RecordingChange.STARTED, "b"),
     ]
@@ -91,6 +90,18 @@ def test_losses_close_to_each_other_are_one_event() -> None:
     assert times == [0], "it never stopped losing"
     lost = status(recording_id="a", messages_lost=99)
     assert seen(events, lost, NOW_S + 40) == [(RecordingChange.LOSS, "a", Severity.WARNING)]
+
+
+def test_a_gap_of_unknown_size_is_a_loss_though_no_message_was_counted() -> None:
+    nothing = status(recording_id="a", label="", messages_lost=0, uncounted_gaps=0)
+    events = begun(nothing)
+    assert seen(events, nothing) == []
+    (event,) = events.take(view(replace(nothing, messages_lost=None, uncounted_gaps=1), NOW_S))
+    assert event.message == "recording a loses messages: 1 gap of unknown size so far"
+    assert isinstance(event.detail, RecordingChanged)
+    assert (event.detail.messages_lost, event.detail.uncounted_gaps) == (None, 1)
+    (event,) = events.take(view(replace(nothing, messages_lost=7, uncounted_gaps=2), NOW_S + 60))
+    assert event.message == "recording a loses messages: 7 so far, and 2 gaps of unknown size"
 
 
 def test_while_it_does_not_answer_nothing_is_concluded() -> None:

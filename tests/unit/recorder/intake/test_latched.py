@@ -14,7 +14,7 @@ TF = replace(STRING, topic="/tf_static", latched=True)
 
 
 def sample(number: int, text: str, channel: Channel = TF) -> Sample:
-    return replace(string_sample(number, text), channel=channel)
+    return replace(string_sample(number, text), channel=channel, sequence=number)
 
 
 def kept(*samples: Sample) -> list[Sample]:

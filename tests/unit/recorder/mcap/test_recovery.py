@@ -1,6 +1,7 @@
 """What is left of a segment after a power failure or a bad block, as independent readers see it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,9 +10,10 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 
+from recorder.mcap.reading import summarise
 from recorder.mcap.recovery import recover
 from recorder.mcap.writer import SegmentWriter
-from recorder.values import GapCause, Loss, Note, SegmentSummary
+from recorder.values import VIDEO_TOPIC, Channel, GapCause, Loss, Note, SegmentSummary
 from tests.support.segments import (
     STRING,
     indexed_log_times,
@@ -21,6 +23,7 @@ from tests.support.segments import (
 )
 
 CHUNKS = (2, 3, 4)
+VIDEO = replace(STRING, topic=VIDEO_TOPIC)
 FIRST_NS = 1_000_000_000
 
 
@@ -154,6 +157,31 @@ def test_gaps_written_before_stay_and_repeating_changes_nothing(
         assert again.path.read_bytes() == once
         assert again.sha256 == first.sha256
         assert again.gaps == first.gaps
+
+
+@pytest.mark.parametrize(
+    ("sequences", "of", "numbered"),
+    [((1, 2), STRING, True), ((0, 0), STRING, False), ((1, 0), STRING, False), ((0, 0), VIDEO, True)],
+    ids=["numbered", "not numbered", "one of both", "video"],
+)
+def test_whether_messages_are_numbered_is_known_however_a_file_ends(
+    tmp_path: Path, sequences: Sequence[int], of: Channel, numbered: bool
+) -> None:
+    """Without numbers no loss is counted, which must not read as no loss."""
+    finished = SegmentWriter(tmp_path / "000000.mcap.part")
+    cut = SegmentWriter(tmp_path / "000001.mcap.part")
+    for number, sequence in enumerate(sequences):
+        for writer in (finished, cut):
+            writer.write(replace(string_sample(number, channel=of), sequence=sequence))
+    summary = finished.finish()
+    assert (summary.numbered, summary.messages) == (numbered, len(sequences))
+    assert summarise(summary.path) == summary
+    cut.flush()
+    cut.abandon()
+    found = recover(tmp_path / "000001.mcap.part")
+    assert found
+    assert (found.numbered, found.messages) == (numbered, len(sequences))
+    assert summarise(found.path) == found
 
 
 def test_losses_are_told_again(tmp_path: Path) -> None:

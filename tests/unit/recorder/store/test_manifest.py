@@ -1,5 +1,6 @@
 """Manifests: what they keep, and what is no manifest."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from recorder.store.manifest import (
     bounded,
     read_manifest,
 )
-from recorder.values import VIDEO_TOPIC, ChannelSummary, Gap, GapCause, SegmentSummary
+from recorder.values import VIDEO_TOPIC, ChannelSummary, Gap, GapCause, Losses, SegmentSummary
 
 ID = "20260101T000000Z-abcdef"
 SEGMENT = {"name": "data/000000.mcap", "size": 1, "sha256": "0" * 64}
@@ -77,11 +78,49 @@ def test_counts_add_up_and_topics_are_named_once() -> None:
     assert made.spanning().ended_unix_ms == 9
 
 
-def test_lost_messages_are_unknown_where_a_part_is() -> None:
-    known = manifest(gaps=[gap(1, 2), gap(2, 3), gap(3, None, GapCause.INTERRUPTED)])
-    assert known.lost == 5
-    assert manifest(gaps=[gap(1, 2), gap(2, None)]).lost is None
-    assert manifest(numbered=False).lost is None
+def test_gaps_of_unknown_size_are_counted_and_never_read_as_nothing_lost() -> None:
+    known = [gap(1, 2), gap(2, 3)]
+    assert manifest(gaps=known).losses == Losses(messages=5)
+    cut = gap(3, None, GapCause.INTERRUPTED)
+    found = manifest(gaps=[*known, cut, gap(4, None, GapCause.VIDEO)]).losses
+    assert (found.counted, found.uncounted) == (5, 1)
+    assert manifest(gaps=[cut]).losses.counted is None, "not 0"
+    assert manifest(numbered=False).losses.counted is None
+    assert manifest().losses.counted == 0
+
+
+def test_gaps_beyond_the_bound_are_counted_one_by_one() -> None:
+    gaps = [*(gap(at) for at in range(MAX_GAPS)), *(gap(at + MAX_GAPS, None) for at in range(7))]
+    made = manifest(gaps=gaps)
+    assert len(made.all_gaps) == MAX_GAPS
+    assert (made.losses.counted, made.losses.uncounted) == (MAX_GAPS, 7)
+
+
+def test_one_file_without_numbers_makes_the_count_unknown(tmp_path: Path) -> None:
+    unnumbered = replace(summary(), numbered=False)
+    made = manifest().with_segment("data/000000.mcap", summary())
+    made = made.with_segment("data/000001.mcap", unnumbered)
+    assert made.losses.counted is None
+    folder = tmp_path / ID
+    folder.mkdir()
+    made.write(folder)
+    assert read_manifest(folder).losses.counted is None
+    assert made.summaries(folder)[1].numbered is False
+
+
+def test_a_file_that_can_t_be_read_is_a_gap_between_its_neighbours() -> None:
+    made = manifest()
+    for number in (0, 2):
+        times = replace(summary(), first_ns=number * 10, last_ns=number * 10 + 5)
+        made = made.with_segment(f"data/{number:06d}.mcap", times)
+    found = made.without_segment("data/000001.mcap")
+    assert found.gaps == (Gap("", GapCause.DISK, 5, 20, None),)
+    assert found.without_segment("data/000001.mcap") == found, "once"
+    last = made.without_segment("data/000003.mcap")
+    assert last.gaps == (Gap("", GapCause.DISK, 25, 25, None),)
+    goes_on = last.with_segment("data/000004.mcap", replace(summary(), first_ns=40, last_ns=45))
+    again = goes_on.without_segment("data/000003.mcap")
+    assert again.gaps == (Gap("", GapCause.DISK, 25, 40, None),), "the same one, longer"
 
 
 def test_gaps_beyond_the_bound_become_one() -> None:

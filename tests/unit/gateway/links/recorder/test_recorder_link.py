@@ -42,8 +42,9 @@ async def test_a_loss_is_dated_and_a_new_process_counts_from_its_own_begin() -> 
         (reported(messages_lost=5), None),
         (reported(messages_lost=6), 103.0),
         (reported(messages_lost=6, messages_dropped=1), 104.0),
-        (reported(instance_id="b", messages_lost=9), 104.0),
-        (reported(instance_id="b", messages_lost=10), 106.0),
+        (reported(messages_lost=6, messages_dropped=1, uncounted_gaps=1), 105.0),
+        (reported(instance_id="b", messages_lost=9), 105.0),
+        (reported(instance_id="b", messages_lost=10), 107.0),
     ]
     for number, (report, lost_s) in enumerate(steps, start=1):
         now[0] = 100.0 + number
@@ -56,7 +57,7 @@ async def test_a_loss_is_dated_and_a_new_process_counts_from_its_own_begin() -> 
         assert link.view.lost_s == lost_s
     recorder.queue.put_nowait(None)
     assert await link.changes.wait_until(lambda: bool(link.view.error), 5)
-    assert (link.view.error, link.view.lost_s) == ("gone", 106.0)
+    assert (link.view.error, link.view.lost_s) == ("gone", 107.0)
     assert link.view.report, "what it reported last is kept"
     recorder.queue.put_nowait(reported())
     assert await link.changes.wait_until(lambda: link.view.reachable, 5)

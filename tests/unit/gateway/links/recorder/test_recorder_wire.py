@@ -50,7 +50,14 @@ def test_a_state_that_it_can_not_report_breaks_the_connection(number: int) -> No
 
 
 def test_a_report_arrives_whole() -> None:
-    message = WatchStateResponse(instance_id="a", messages_lost=0, messages_dropped=3, disk_short=True)
+    message = WatchStateResponse(
+        instance_id="a",
+        messages_lost=0,
+        messages_dropped=3,
+        disk_short=True,
+        uncounted_gaps=5,
+        ring_failures=7,
+    )
     message.status.state, message.status.room_s = pb.RECORDER_STATE_RECORDING, 0
     message.status.presets.add(name="driving", in_ring=True)
     message.newest.id, message.newest.state = "b", pb.RECORDING_STATE_RECORDING
@@ -58,6 +65,7 @@ def test_a_report_arrives_whole() -> None:
     report = wire.report_from(message)
     assert (report.instance_id, report.messages_lost, report.missing, report.disk_short) == ("a", 0, 3, True)
     assert (report.status.state, report.status.room_s) == (RecorderState.RECORDING, 0)
+    assert (report.uncounted_gaps, report.ring_failures) == (5, 7)
     assert report.status.messages_lost is None
     assert [each.name for each in report.status.presets] == ["driving"]
     assert [(each.id, each.kind) for each in report.ended] == [("c", None)]

@@ -52,6 +52,7 @@ DETAILS: list[Detail] = [
         RecordingState.COMPLETE,
         RecordingStopReason.DISK,
         7,
+        3,
     ),
     CloudChanged(CloudState.REFUSED, "it was revoked"),
     RecordingCopyChanged("a", "lap", RecordingCopy(RecordingCopyState.FAILED, "no network", 7)),
