@@ -7,6 +7,8 @@ LARGEST_MESSAGE: Final = 512 * 1024
 """Bytes that streams take and credentials permit; a server disconnects a client that sends more."""
 INBOXES: Final = "_INBOX"
 """Prefix of the inboxes of people and programs of the hub, which share it."""
+MOST_FILES: Final = 20_000
+"""Of a recording: the names of so many segments take 360 KiB, which one message has room for."""
 ROBOT_NAME: Final = re.compile(r"[a-z0-9](?:[a-z0-9-]{0,61}[a-z0-9])?")
 """A robot's name, and a fleet's: a DNS label (RFC 1123 2.1), and so one token of a subject and a key."""
 

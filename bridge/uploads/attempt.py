@@ -11,6 +11,7 @@ other: no part is ever in memory, and a cut costs at most one part.
 | the store has forgotten the multipart upload | the file is begun again, once in an attempt |
 | the recording is deleted meanwhile | `GoneError` |
 | a file is another one by now, or the robot's disk can't read it | `RecordingError` |
+| the list of files is too long, or not that of the recording's SHA-256 | `RecordingError`; nothing is sent |
 | the bytes in the store are wrong | deleted; `RecordingError`, and the next attempt sends them again |
 | a receipt is forged, or for something else | `RecordingError`; never VERIFIED |
 """
@@ -36,7 +37,8 @@ from console.client.errors import (
     Overloaded,
     Unreachable,
 )
-from fleet.receipt_keys import ReceiptError, confirmed
+from fleet.names import MOST_FILES
+from fleet.receipt_keys import ReceiptError, confirmed, digest_of
 from omniseer.fleet.v1 import upload_pb2 as pb
 
 _ENDED: Final = frozenset(
@@ -146,6 +148,10 @@ class Attempt:
             raise RecordingError("the robot has not finished reading its files")
         if not recording.files:
             raise RecordingError("the recording has no files")
+        if len(recording.files) > MOST_FILES:
+            raise RecordingError(f"it has more files than the fleet's store takes, {MOST_FILES}: export it")
+        if recording.sha256 and recording.sha256 != digest_of(map(file_message, recording.files)):
+            raise RecordingError("the robot's list of its files is not whole, or has changed meanwhile")
         if any(part_count(file.size) > MOST_PARTS for file in recording.files):
             limit_gib = MOST_PARTS * PART_BYTES // 1024**3
             raise RecordingError(f"one of its files is larger than {limit_gib} GiB")

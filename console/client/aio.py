@@ -50,6 +50,7 @@ from console.client.streams import Outage, Streams
 from console.client.transport import GrpcTransport
 from console.client.unary import UnaryCalls
 from console.client.uploading import UploadProgress, upload_progress
+from console.client.whole_recording import with_all_files
 from console.credentials import Credentials
 from console.target import DEFAULT_TARGET, parse_target
 
@@ -350,9 +351,16 @@ class AsyncGatewayClient:
             seen.add(token)
 
     async def recording(self, recording_id: str) -> results.Recording:
-        """Returns a recording with its files and gaps."""
-        request = recording.get_request(recording_id)
-        return (await self._call_recording(GET_RECORDING, request)).recording
+        """Returns a recording with all of its files, which the robot lists a page at a time, and its gaps.
+
+        Raises:
+            Unsupported: The robot's software is too old to list as many files.
+        """
+
+        async def page(token: str) -> results.RecordingFound:
+            return await self._call_recording(GET_RECORDING, recording.get_request(recording_id, token))
+
+        return await with_all_files(page)
 
     async def recording_thumbnail(self, recording_id: str) -> results.RecordingThumbnail:
         """Returns a coded key frame of a recording's video."""

@@ -29,7 +29,7 @@ from typing import Any, Final, ParamSpec, Protocol, TypeVar
 from google.protobuf.message import DecodeError, Message
 
 from fleet.errors import HubError, HubReason
-from fleet.names import LARGEST_MESSAGE, RECORDINGS
+from fleet.names import LARGEST_MESSAGE, MOST_FILES, RECORDINGS
 from fleet.receipt_keys import ReceiptError, ReceiptSigner, confirmed, digest_of
 from hub.receiver.keys import BadNameError, RecordingKeys, checked
 from hub.receiver.store import PART_BYTES, URL_VALID_S, Store, StoredObject, StoreError, StoreProblem
@@ -43,7 +43,6 @@ _T = TypeVar("_T")
 THREADS: Final = 16
 """Calls of the store at once."""
 PROGRESS_S: Final = 2.0
-_MOST_FILES: Final = 10_000
 _MOST_URLS: Final = 16
 _MOST_PARTS: Final = 10_000
 _LONGEST_ID: Final = 2048
@@ -331,8 +330,8 @@ class ReceiverService:
     async def _complete_upload(self, robot: str, request: pb.CompleteUploadRequest, send: _Send) -> Message:
         recording, names = request.recording, sorted(set(request.file_names))
         keys = self._keys(robot, recording.id)
-        if not 0 < len(names) <= _MOST_FILES:
-            raise Refusal(pb.UPLOAD_ERROR_CODE_INVALID, f"a recording has 1 to {_MOST_FILES} files")
+        if not 0 < len(names) <= MOST_FILES:
+            raise Refusal(pb.UPLOAD_ERROR_CODE_INVALID, f"a recording has 1 to {MOST_FILES} files")
         for name in names:
             checked(name)
         files: list[RecordingFile] = []
@@ -381,7 +380,7 @@ class ReceiverService:
 
     async def _missing(self, keys: RecordingKeys, files: Iterable[RecordingFile]) -> str:
         """Returns the name of a file that is not in the store with its size; empty if all are."""
-        sizes = await self._call(self._store.sizes, f"{keys.folder}/", 2 * _MOST_FILES)
+        sizes = await self._call(self._store.sizes, f"{keys.folder}/", 2 * MOST_FILES)
         return next((file.name for file in files if sizes.get(keys.file(file.name)) != file.size), "")
 
     async def _receipt(self, robot: str, keys: RecordingKeys, file: RecordingFile) -> pb.SignedReceipt | None:

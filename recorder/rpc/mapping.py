@@ -10,7 +10,7 @@ from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
 from recorder.config import RecorderSettings
 from recorder.lifecycle import State
-from recorder.requests import Live
+from recorder.rpc.file_pages import FilePage, file_page
 from recorder.status_reader import StatusReader
 from recorder.store.manifest import Copy, CopyState, Kind, Manifest, RecordingState, StopReason
 from recorder.store.run_bundles import Bundle
@@ -45,13 +45,12 @@ _COPY_STATES_BACK: Final = {message: state for state, message in COPY_STATES.ite
 _NS_PER_MS: Final = 1_000_000
 
 
-def recording(status_reader: StatusReader, manifest: Manifest, *, whole: bool = False) -> pb.Recording:
-    """Returns the message of a recording.
+def recording(status_reader: StatusReader, manifest: Manifest) -> pb.Recording:
+    """Returns the message of a recording, without its files and gaps.
 
     Args:
-        status_reader: have how far it has come, if it runs.
+        status_reader: has how far it has come, if it runs.
         manifest: of the recording.
-        whole: whether with its files and gaps.
     """
     live = status_reader.live(manifest)
     gaps = manifest.all_gaps
@@ -87,18 +86,59 @@ def recording(status_reader: StatusReader, manifest: Manifest, *, whole: bool = 
     message.uncounted_gaps = live.losses.uncounted
     if (lost := live.losses.counted) is not None:
         message.messages_lost = lost
-    if whole:
-        message.files.extend(_files(manifest, live)[:10_000])
-        message.gaps.extend(_gap(each) for each in gaps)
     return message
 
 
-def bundle(found: Bundle, sums: Mapping[str, bytes] | None = None) -> pb.Recording:
-    """Returns the message of a run bundle; with its files if their sums are given."""
+def recording_page(status_reader: StatusReader, manifest: Manifest, token: str) -> pb.GetRecordingResponse:
+    """Returns a recording with a page of its files; on the first page with its gaps, too.
+
+    Args:
+        status_reader: has how far it has come, if it runs.
+        manifest: of the recording.
+        token: of the page before; empty for the first one.
+
+    Raises:
+        InvalidRequestError: the token leads to no page.
+    """
+    live, files = status_reader.live(manifest), manifest.files
+    page = file_page([*(file.name for file in files), *([live.part] if live.part else [])], token)
+    message = recording(status_reader, manifest)
+    for at in page.files:
+        if at < len(files):
+            file = files[at]
+            message.files.add(
+                name=file.name, size=file.size, sha256=bytes.fromhex(file.sha256), final=True
+            )
+        else:
+            message.files.add(name=live.part, size=live.part_bytes)
+    if not token:
+        message.gaps.extend(_gap(each) for each in manifest.all_gaps)
+    return pb.GetRecordingResponse(recording=message, next_page_token=page.next_token)
+
+
+def bundle_page(found: Bundle, page: FilePage, sums: Mapping[str, bytes]) -> pb.GetRecordingResponse:
+    """Returns a run bundle with a page of its files.
+
+    Args:
+        found: the bundle.
+        page: of its files.
+        sums: of files by name, as far as they are known.
+    """
+    message = bundle(found)
+    for at in page.files:
+        file = found.files[at]
+        sha256 = sums.get(file.name, b"")
+        message.files.add(name=file.name, size=file.size, sha256=sha256, final=found.final and bool(sha256))
+    return pb.GetRecordingResponse(recording=message, next_page_token=page.next_token)
+
+
+def bundle(found: Bundle) -> pb.Recording:
+    """Returns the message of a run bundle, without its files."""
     final = found.final
     message = pb.Recording(
         id=found.id,
         label=found.folder.name if found.folder.name.isprintable() else "",
+        notes=_unlisted(found.unlisted),
         kind=pb.RECORDING_KIND_RUN_BUNDLE,
         state=RECORDING_STATES[found.state],
         started_unix_ms=found.started_unix_ms,
@@ -109,10 +149,13 @@ def bundle(found: Bundle, sums: Mapping[str, bytes] | None = None) -> pb.Recordi
     )
     if found.state is RecordingState.RECOVERED:
         message.stop_reason = pb.RECORDING_STOP_REASON_INTERRUPTED
-    for file in found.files if sums is not None else ():
-        sha256 = (sums or {}).get(file.name, b"")
-        message.files.add(name=file.name, size=file.size, sha256=sha256, final=final and bool(sha256))
     return message
+
+
+def _unlisted(files: int) -> str:
+    """Returns what a run bundle lacks here, so that it is not taken for whole."""
+    many = f"{files} of its files are" if files > 1 else "one of its files is"
+    return f"{many} not listed: names too long, or not printable; copy them on the robot" if files else ""
 
 
 def status(status_reader: StatusReader, settings: RecorderSettings) -> pb.RecordingStatus:
@@ -189,16 +232,6 @@ def copy(message: pb.RecordingCopy) -> Copy:
 
 def _copy(value: Copy) -> pb.RecordingCopy:
     return pb.RecordingCopy(state=COPY_STATES[value.state], reason=value.reason, bytes_done=value.bytes_done)
-
-
-def _files(manifest: Manifest, live: Live) -> list[pb.RecordingFile]:
-    files = [
-        pb.RecordingFile(name=file.name, size=file.size, sha256=bytes.fromhex(file.sha256), final=True)
-        for file in manifest.files
-    ]
-    if live.part:
-        files.append(pb.RecordingFile(name=live.part, size=live.part_bytes))
-    return files
 
 
 def _gap(gap: Gap) -> pb.RecordingGap:

@@ -18,6 +18,7 @@ from recorder.requests import Result, SnapshotOptions, StartOptions
 from recorder.rpc import mapping
 from recorder.rpc.export_connections import ExportConnections
 from recorder.rpc.exporter import Exporter, metadata
+from recorder.rpc.file_pages import file_page
 from recorder.status_reader import StatusReader
 from recorder.store.bundle_reader import BundleReader
 from recorder.store.manifest import Manifest
@@ -138,11 +139,14 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
     async def GetRecording(  # noqa: N802  # the schema names it
         self, request: pb.GetRecordingRequest, _context: grpc.aio.ServicerContext[Any, Any]
     ) -> pb.GetRecordingResponse:
-        """Returns a recording with its files."""
-        if bundle := await self._bundle(request.recording_id):
-            return pb.GetRecordingResponse(recording=mapping.bundle(bundle, await self._bundles.sums(bundle)))
-        manifest = self._status_reader.get(request.recording_id)
-        return pb.GetRecordingResponse(recording=mapping.recording(self._status_reader, manifest, whole=True))
+        """Returns a recording with a page of its files."""
+        bundle = await self._bundle(request.recording_id)
+        if bundle is None:
+            manifest = self._status_reader.get(request.recording_id)
+            return mapping.recording_page(self._status_reader, manifest, request.page_token)
+        page = file_page([file.name for file in bundle.files], request.page_token)
+        sums = await self._bundles.sums(bundle, [bundle.files[at] for at in page.files])
+        return mapping.bundle_page(bundle, page, sums)
 
     async def ExportRecording(  # noqa: N802  # the schema names it
         self, request: pb.ExportRecordingRequest, context: grpc.aio.ServicerContext[Any, Any]

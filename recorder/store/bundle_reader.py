@@ -65,15 +65,20 @@ class BundleReader:
         """Returns a bundle; None if there is no such."""
         return await self._threads.run(self._bundles.get, bundle_id)
 
-    async def sums(self, bundle: Bundle) -> dict[str, bytes]:
-        """Returns the sums of a bundle's files by name, without those that have not been read, or can't be.
+    async def sums(self, bundle: Bundle, files: Sequence[BundleFile]) -> dict[str, bytes]:
+        """Returns sums of files by name, without those that have not been read, or can't be.
+
+        Args:
+            bundle: all of whose files are read.
+            files: those that the caller asks for.
 
         Raises:
             TooMuchError: as many bundles as permitted are read.
         """
-        states = {file.name: _state_of(bundle, file) for file in bundle.files} if bundle.final else {}
+        states = {file.name: _state_of(bundle, file) for file in files} if bundle.final else {}
         if any(self._sums.known(state) is None for state in states.values()):
-            await asyncio.wait({self._read(bundle.id, list(states.values()))}, timeout=ANSWER_WITHIN_S)
+            every = [_state_of(bundle, file) for file in bundle.files]
+            await asyncio.wait({self._read(bundle.id, every)}, timeout=ANSWER_WITHIN_S)
         known = {name: self._sums.known(state) for name, state in states.items()}
         return {name: sha256 for name, sha256 in known.items() if sha256 is not None}
 

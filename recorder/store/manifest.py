@@ -16,7 +16,8 @@ from recorder.values import VIDEO_TOPIC, ChannelSummary, Gap, GapCause, Losses, 
 
 MAX_GAPS: Final = 1000
 _NS_PER_MS: Final = 1_000_000
-_MAX_BYTES: Final = 64 * 1024 * 1024
+_MAX_BYTES: Final = 1024 * 1024 * 1024
+"""Of a manifest; a segment takes some hundred bytes of it. A longer one counts as damaged."""
 
 
 class Kind(StrEnum):
@@ -166,7 +167,7 @@ class Manifest(_Part):
 
     @property
     def files(self) -> tuple[File, ...]:
-        """Its final files, in the order of their names."""
+        """Its final files: the segments by number, then rosbag2's file."""
         return (*self.segments, self.metadata) if self.metadata else self.segments
 
     @property
@@ -258,7 +259,8 @@ class Manifest(_Part):
             numbered=summary.numbered,
         )
         segments = sorted(
-            (*(each for each in self.segments if each.name != name), added), key=lambda each: each.name
+            (*(each for each in self.segments if each.name != name), added),
+            key=lambda each: segment_number(each.name),
         )
         return self.model_copy(update={"topics": tuple(topics), "segments": tuple(segments)})
 

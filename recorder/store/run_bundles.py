@@ -5,17 +5,22 @@ name where that has other characters than IDs may have.
 """
 
 import hashlib
+import logging
 import os
 import re
 import stat
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Final
 
 from recorder.store.manifest import RecordingState
 
-MAX_FILES: Final = 10_000
+_log = logging.getLogger(__name__)
+
+MAX_FILES: Final = 100_000
+"""A folder with more is not listed: a part of it would pass for the whole."""
 _MAX_BUNDLES: Final = 10_000
 _MANIFEST: Final = "manifest.yaml"
 _MANIFEST_BYTES: Final = 1024 * 1024
@@ -31,7 +36,11 @@ _STATES: Final = {
 }
 _NS_PER_MS: Final = 1_000_000
 _MAX_NAME: Final = 255
-"""Of a file below its bundle, as requests are limited; one with a longer name is not listed."""
+"""Of a file below its bundle, as requests are limited; one with a longer name is counted, and not listed."""
+
+
+class TooManyFilesError(OSError):
+    """A folder with more than MAX_FILES files."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +62,8 @@ class Bundle:
     files: tuple[BundleFile, ...]
     began_ns: int
     ended_ns: int
+    unlisted: int = 0
+    """Files whose names are too long, or can't be printed: they can't be requested."""
 
     @property
     def size(self) -> int:
@@ -83,13 +94,18 @@ class RunBundles:
 
     def __init__(self, folders: Sequence[Path]) -> None:
         self._folders = tuple(folders)
+        self._refused: set[Path] = set()
+        """Folders of which the log says that they are not listed."""
 
     def all(self) -> list[Bundle]:
-        """Returns all bundles, without those that can't be read."""
+        """Returns all bundles, without those that can't be read, or have more than MAX_FILES files."""
         found: dict[str, Bundle] = {}
         for folder in self._candidates():
             try:
                 bundle = _read(folder)
+            except TooManyFilesError as error:
+                self._refuse(folder, error)
+                continue
             except OSError:
                 continue  # Gone, or another user's.
             found.setdefault(bundle.id, bundle)
@@ -107,6 +123,12 @@ class RunBundles:
             except OSError:
                 return None
         return None
+
+    def _refuse(self, folder: Path, error: TooManyFilesError) -> None:
+        """Logs once that a folder is not listed."""
+        if folder not in self._refused:
+            self._refused.add(folder)
+            _log.warning("%s is not listed: %s", folder, error)
 
     def _candidates(self, bundle_id: str = "") -> Iterator[Path]:
         """Yields the folders that are bundles: those with an ID, or all."""
@@ -129,10 +151,20 @@ def _id_of(name: str) -> str:
 
 
 def _read(folder: Path) -> Bundle:
+    """Reads a bundle's folder.
+
+    Raises:
+        OSError: it can't be read.
+        TooManyFilesError: it has too many files.
+    """
     with (folder / _MANIFEST).open("rb") as file:
         stated = _STATE.search(file.read(_MANIFEST_BYTES))
-    files = sorted(_files(folder), key=lambda each: each.name)[:MAX_FILES]
-    times = [each.changed_ns for each in files]
+    found = list(islice(_files(folder), MAX_FILES + 1))
+    if len(found) > MAX_FILES:
+        raise TooManyFilesError(f"it has more than {MAX_FILES} files; split it, or copy it by other means")
+    files = sorted((each for each in found if _is_requestable(each.name)), key=lambda each: each.name)
+    # Any file system may have files from before 1970.
+    times = [max(each.changed_ns, 0) for each in files]
     return Bundle(
         id=_id_of(folder.name),
         folder=folder,
@@ -140,6 +172,7 @@ def _read(folder: Path) -> Bundle:
         files=tuple(files),
         began_ns=min(times, default=0),
         ended_ns=max(times, default=0),
+        unlisted=len(found) - len(files),
     )
 
 
@@ -149,5 +182,9 @@ def _files(folder: Path) -> Iterator[BundleFile]:
             path = Path(directory) / name
             status = path.lstat()
             relative = path.relative_to(folder).as_posix()
-            if stat.S_ISREG(status.st_mode) and relative.isprintable() and len(relative) <= _MAX_NAME:
+            if stat.S_ISREG(status.st_mode):
                 yield BundleFile(relative, status.st_size, status.st_mtime_ns)
+
+
+def _is_requestable(name: str) -> bool:
+    return name.isprintable() and len(name) <= _MAX_NAME

@@ -16,7 +16,8 @@ from common.reader_threads import ReaderThreads
 MAX_BYTES_PER_S: Final = 256 * 1024 * 1024
 """Of all files together. A processor with SHA extensions takes 2 GB/s; one without leaves room for others."""
 _BLOCK_BYTES: Final = 1024 * 1024
-MAX_KNOWN: Final = 20_000
+MAX_KNOWN: Final = 150_000
+"""More than a run bundle may have: of one that has more, some sums would always be forgotten."""
 MAX_BEGUN: Final = 16
 """Files of which a part has been read; beyond that the one that has waited longest is read anew."""
 

@@ -69,6 +69,8 @@ class RecorderDouble(RecorderServiceServicer):
         copy_wanted: recordings that still have to be copied.
         set_copies: every state of a copy that it was given.
         snapshots_run: how many snapshots are being made.
+        files_of_page: so many files are listed at once.
+        has_pages: whether it lists the others as well; recorders of former releases do not.
     """
 
     def __init__(self) -> None:
@@ -89,6 +91,7 @@ class RecorderDouble(RecorderServiceServicer):
         self.copy_wanted: set[str] = set()
         self.set_copies: list[recorder_service_pb2.SetCopyRequest] = []
         self.has_ring = self.has_video = self.has_room = True
+        self.files_of_page, self.has_pages = 10_000, True
         self._answers: dict[str, Any] = {}
         self._changed = asyncio.Event()
         self._count = 0
@@ -227,11 +230,15 @@ class RecorderDouble(RecorderServiceServicer):
         self.looks.append("GetRecording")
         recording = pb.Recording()
         recording.CopyFrom(self._found(request.recording_id))
-        for name, data in sorted(self.files[recording.id].items()):
+        listed = sorted(self.files[recording.id].items())
+        begin = [name for name, _ in listed].index(request.page_token) + 1 if request.page_token else 0
+        end = begin + self.files_of_page
+        for name, data in listed[begin:end]:
             final = name not in self.unfinal
             digest = self._digest(data) if final else b""
             recording.files.add(name=name, size=len(data), sha256=digest, final=final)
-        return pb.GetRecordingResponse(recording=recording)
+        more = listed[end - 1][0] if self.has_pages and end < len(listed) else ""
+        return pb.GetRecordingResponse(recording=recording, next_page_token=more)
 
     async def ExportRecording(  # noqa: N802
         self, request: pb.ExportRecordingRequest, _context: Any
@@ -339,7 +346,8 @@ class RecorderDouble(RecorderServiceServicer):
         files = self.files[recording.id]
         recording.size, recording.file_count = sum(map(len, files.values())), len(files)
         if recording.state == pb.RECORDING_STATE_COMPLETE:
-            recording.sha256 = sha256(b"".join(sha256(data) for _, data in sorted(files.items())))
+            lines = [f"{sha256(data).hex()}  {name}\n" for name, data in sorted(files.items())]
+            recording.sha256 = sha256("".join(lines).encode())
 
     def _digest(self, data: bytes) -> bytes:
         return bytes(32) if self.wrong_digest else sha256(data)

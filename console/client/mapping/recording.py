@@ -46,9 +46,9 @@ def list_request(page_size: int, page_token: str) -> bytes:
     return wire.ListRecordingsRequest(page_size=page_size, page_token=page_token).SerializeToString()
 
 
-def get_request(recording_id: str) -> bytes:
+def get_request(recording_id: str, page_token: str = "") -> bytes:
     """Returns the request of GetRecording."""
-    return wire.GetRecordingRequest(recording_id=recording_id).SerializeToString()
+    return wire.GetRecordingRequest(recording_id=recording_id, page_token=page_token).SerializeToString()
 
 
 def thumbnail_request(recording_id: str) -> bytes:

@@ -238,9 +238,11 @@ class RecordingPage:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordingFound:
-    """One recording with its files and gaps."""
+    """One recording with a page of its files; on the first page with its gaps, too."""
 
     recording: Recording
+    next_page_token: str
+    """Empty: these were the last files."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,6 +2,7 @@
 
 import asyncio
 import hashlib
+import os
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,11 @@ from omniseer.gateway.v1 import fault_pb2
 from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
 from recorder.mcap.writer import SegmentWriter
+from recorder.rpc import file_pages
+from recorder.rpc.file_pages import MOST_FILES
+from recorder.store.folder import RECORDINGS, new_id, segment_name
+from recorder.store.manifest import Kind, Manifest, RecordingState, Segment
+from recorder.values import Gap, GapCause
 from tests.support.recorder_in_process import Source
 from tests.support.refusals import refused
 from tests.support.segments import string_sample
@@ -160,6 +166,55 @@ async def test_pages(tmp_path: Path) -> None:
         assert await refused(bad) == (grpc.StatusCode.INVALID_ARGUMENT, "INVALID_REQUEST")
 
 
+async def test_a_recording_of_more_files_than_a_page_is_listed_to_its_last_one(tmp_path: Path) -> None:
+    folder = tmp_path / "root" / RECORDINGS / new_id(1.7e9)
+    folder.mkdir(parents=True)
+    count = 2 * MOST_FILES + 7
+    segments = tuple(Segment(name=segment_name(each), size=1, sha256="0" * 64) for each in range(count))
+    gap = Gap("", GapCause.DISK, 1, 2, None)
+    Manifest(
+        id=folder.name, kind=Kind.MANUAL, state=RecordingState.COMPLETE, segments=segments, gaps=(gap,)
+    ).write(folder)
+    async with served(tmp_path) as robot:
+        pages, token = [], ""
+        while True:
+            asked = pb.GetRecordingRequest(recording_id=folder.name, page_token=token)
+            pages.append(await robot.stub.GetRecording(asked))
+            assert pages[-1].ByteSize() < 4 * 1024 * 1024, "what callers take"
+            assert pages[-1].recording.file_count == count
+            if not (token := pages[-1].next_page_token):
+                break
+        names = [file.name for page in pages for file in page.recording.files]
+        assert names == [each.name for each in segments]
+        assert [len(page.recording.files) for page in pages] == [MOST_FILES, MOST_FILES, 7]
+        assert [len(page.recording.gaps) for page in pages] == [1, 0, 0]
+        asked = pb.GetRecordingRequest(recording_id=folder.name, page_token="data/none.mcap")
+        invalid = (grpc.StatusCode.INVALID_ARGUMENT, "INVALID_REQUEST")
+        assert await refused(robot.stub.GetRecording(asked)) == invalid
+
+
+async def test_a_run_bundle_of_more_files_than_a_page_is_listed_to_its_last_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(file_pages, "MOST_FILES", 3)
+    bundle = tmp_path / "runs" / "first"
+    bundle.mkdir(parents=True)
+    (bundle / "manifest.yaml").write_text("state: complete\n", encoding="utf-8")
+    for number in range(7):
+        (bundle / f"{number}.jsonl").write_bytes(b"x")
+    async with served(tmp_path, run_bundles=[str(tmp_path / "runs")]) as robot:
+        files, token = [], ""
+        while True:
+            asked = pb.GetRecordingRequest(recording_id="run-first", page_token=token)
+            page = await robot.stub.GetRecording(asked)
+            files += page.recording.files
+            if not (token := page.next_page_token):
+                break
+        assert [file.name for file in files] == [*(f"{number}.jsonl" for number in range(7)), "manifest.yaml"]
+        assert page.recording.file_count == 8
+        assert all(file.final and len(file.sha256) == 32 for file in files)
+
+
 async def test_run_bundles_are_listed_and_exported_and_never_changed(tmp_path: Path) -> None:
     runs = tmp_path / "runs"
     bundle = runs / "2026-01-01 first run"
@@ -219,6 +274,29 @@ async def test_after_a_start_with_an_old_time_the_state_can_be_had(tmp_path: Pat
         state = await anext(aiter(states))
         assert 0 <= state.status.ring_s <= robot.running.settings.ring.seconds
         assert (await robot.stub.ListRecordings(pb.ListRecordingsRequest())).status.presets
+
+
+async def test_a_file_from_before_1970_costs_no_list(tmp_path: Path) -> None:
+    bundle = tmp_path / "runs" / "first"
+    bundle.mkdir(parents=True)
+    (bundle / "manifest.yaml").write_text("state: complete\n", encoding="utf-8")
+    os.utime(bundle / "manifest.yaml", (-(10**9), -(10**9)))
+    async with served(tmp_path, run_bundles=[str(tmp_path / "runs")]) as robot:
+        (listed,) = (await robot.stub.ListRecordings(pb.ListRecordingsRequest())).recordings
+        assert (listed.id, listed.started_unix_ms) == ("run-first", 0)
+
+
+async def test_a_run_bundle_says_which_of_its_files_it_lacks_here(tmp_path: Path) -> None:
+    bundle = tmp_path / "runs" / "first"
+    bundle.mkdir(parents=True)
+    (bundle / "manifest.yaml").write_text("state: complete\n", encoding="utf-8")
+    async with served(tmp_path, run_bundles=[str(tmp_path / "runs")]) as robot:
+        asked = pb.GetRecordingRequest(recording_id="run-first")
+        assert (await robot.stub.GetRecording(asked)).recording.notes == ""
+        (bundle / "a\nb").write_bytes(b"x")
+        found = (await robot.stub.GetRecording(asked)).recording
+        assert [file.name for file in found.files] == ["manifest.yaml"]
+        assert found.notes.startswith("one of its files is not listed")
 
 
 async def test_a_start_that_makes_no_sense(tmp_path: Path) -> None:

@@ -87,6 +87,33 @@ async def test_what_could_not_be_counted_is_shown_and_never_as_nothing_lost(tmp_
         assert (shown["messages_lost"], shown["uncounted_gaps"]) == (5, 1)
 
 
+async def test_a_recording_of_several_pages_is_shown_and_exported_whole(tmp_path: Path) -> None:
+    double = RecorderDouble()
+    files = {f"data/{number:06}.mcap": bytes([number]) * 100 for number in range(7)}
+    double.add(files, id="one")
+    double.files_of_page = 3
+    to = tmp_path / "to"
+    async with recording_robot(tmp_path, double) as robot:
+        shown = await printed(robot, "show", "one")
+        assert [each["name"] for each in shown["files"]] == list(files)
+        assert (await printed(robot, "export", "one", "--to", str(to)))["files"] == 7
+        assert {name: (to / "one" / name).read_bytes() for name in files} == files
+
+
+async def test_a_robot_that_lists_a_part_of_the_files_exports_nothing_as_if_it_were_all(
+    tmp_path: Path,
+) -> None:
+    double = RecorderDouble()
+    double.add({f"data/{number:06}.mcap": b"1" for number in range(7)}, id="one")
+    double.files_of_page, double.has_pages = 3, False
+    async with recording_robot(tmp_path, double) as robot:
+        for words in (["show", "one"], ["export", "one", "--to", str(tmp_path / "to")]):
+            ran = await typed(robot, *words)
+            assert ran.returncode == 1
+            assert "lists only 3 of the 7 files of one" in only_line(ran.stderr)
+        assert not (tmp_path / "to").exists()
+
+
 async def test_the_installed_program_and_the_status(tmp_path: Path) -> None:
     async with recording_robot(tmp_path) as robot:
         await robot.start(label="lap")

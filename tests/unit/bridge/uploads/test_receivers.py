@@ -17,6 +17,7 @@ from bridge.uploads.receivers import MOST_PARTS, PART_BYTES, Receivers
 from console.client import results
 from console.client.mapping.reader import read
 from fleet.errors import HubError, HubReason
+from fleet.names import MOST_FILES
 from fleet.receipt_keys import ReceiptSigner
 from omniseer.fleet.v1 import upload_pb2 as pb
 from omniseer.gateway.v1 import recording_pb2 as wire
@@ -181,6 +182,8 @@ async def test_what_can_t_be_uploaded_says_why() -> None:
         ({"state": results.RecordingState.RECORDING}, "has not ended"),
         ({"files": ()}, "no files"),
         ({"files": (replace(file, final=False),)}, "not finished reading"),
+        ({"sha256": b"x" * 32}, "list of its files is not whole"),
+        ({"files": (file,) * (MOST_FILES + 1)}, "more files than the fleet's store takes"),
         ({"files": (replace(file, size=(MOST_PARTS + 1) * PART_BYTES),)}, "larger than 78 GiB"),
     ):
         robot.recordings["one"] = replace(good, **changed)

@@ -716,7 +716,7 @@ def test_every_field_of_the_requests_of_recordings_is_set() -> None:
             "id", pre_s=0, post_s=2, label="label", preset="preset"
         ),
         recording_pb2.ListRecordingsRequest: recording.list_request(7, "token"),
-        recording_pb2.GetRecordingRequest: recording.get_request("recording"),
+        recording_pb2.GetRecordingRequest: recording.get_request("recording", "token"),
         recording_pb2.GetRecordingThumbnailRequest: recording.thumbnail_request("recording"),
         recording_pb2.ExportRecordingRequest: recording.export_request(
             "recording", "file", offset=7, expected_sha256=b"sum", max_bytes_per_s=9

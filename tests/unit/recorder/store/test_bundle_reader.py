@@ -72,10 +72,10 @@ async def test_many_who_list_at_once_have_the_folders_read_once(ground: Ground) 
 
 async def test_who_asks_again_gets_what_was_read_meanwhile(ground: Ground) -> None:
     bundle = await ground.bundle("0")
-    assert "video.ts" not in await ground.reader.sums(bundle)
+    assert "video.ts" not in await ground.reader.sums(bundle, bundle.files)
 
     async def sums() -> dict[str, bytes]:
-        return await ground.reader.sums(bundle)
+        return await ground.reader.sums(bundle, bundle.files)
 
     found = await eventually(sums, lambda now: len(now) == 2, "all files are read")
     assert found["video.ts"] == hashlib.sha256(DATA).digest()
@@ -84,14 +84,15 @@ async def test_who_asks_again_gets_what_was_read_meanwhile(ground: Ground) -> No
 
 async def test_more_bundles_than_permitted_are_refused_until_one_is_read(ground: Ground) -> None:
     for number in range(MOST_AT_ONCE):
-        await ground.reader.sums(await ground.bundle(str(number)))
+        bundle = await ground.bundle(str(number))
+        await ground.reader.sums(bundle, bundle.files)
     last = await ground.bundle(str(MOST_AT_ONCE))
     with pytest.raises(TooMuchError, match="try again later"):
-        await ground.reader.sums(last)
+        await ground.reader.sums(last, last.files)
 
     async def admitted() -> bool:
         try:
-            await ground.reader.sums(last)
+            await ground.reader.sums(last, last.files)
         except TooMuchError:
             return False
         return True

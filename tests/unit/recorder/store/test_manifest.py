@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from recorder.store.folder import segment_name
 from recorder.store.manifest import (
     MAX_GAPS,
     DamagedManifestError,
@@ -76,6 +77,18 @@ def test_counts_add_up_and_topics_are_named_once() -> None:
     assert made.next_number == 3
     assert made.before(1).messages == 2
     assert made.spanning().ended_unix_ms == 9
+
+
+def test_the_millionth_segment_follows_the_one_before(tmp_path: Path) -> None:
+    made = manifest()
+    for number in (1_000_000, 999_999):
+        made = made.with_segment(segment_name(number), summary())
+    assert [each.name for each in made.segments] == ["data/999999.mcap", "data/1000000.mcap"]
+    assert made.next_number == 1_000_001
+    folder = tmp_path / ID
+    folder.mkdir()
+    made.write(folder)
+    assert read_manifest(folder) == made
 
 
 def test_gaps_of_unknown_size_are_counted_and_never_read_as_nothing_lost() -> None:
