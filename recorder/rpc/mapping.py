@@ -42,6 +42,8 @@ COPY_STATES: Final[Mapping[CopyState, pb.RecordingCopyState.ValueType]] = Mappin
     }
 )
 _COPY_STATES_BACK: Final = {message: state for state, message in COPY_STATES.items()}
+MOST_MADE: Final = 1000
+"""Messages of recordings that are kept."""
 _NS_PER_MS: Final = 1_000_000
 
 
@@ -106,9 +108,7 @@ def recording_page(status_reader: StatusReader, manifest: Manifest, token: str) 
     for at in page.files:
         if at < len(files):
             file = files[at]
-            message.files.add(
-                name=file.name, size=file.size, sha256=bytes.fromhex(file.sha256), final=True
-            )
+            message.files.add(name=file.name, size=file.size, sha256=bytes.fromhex(file.sha256), final=True)
         else:
             message.files.add(name=live.part, size=live.part_bytes)
     if not token:
@@ -198,18 +198,41 @@ def status(status_reader: StatusReader, settings: RecorderSettings) -> pb.Record
     return message
 
 
-def watch_state(status_reader: StatusReader, settings: RecorderSettings) -> recorder_pb.WatchStateResponse:
+class RecordingMessages:
+    """Messages of recordings. Of one that has ended it is made once: it takes all files and gaps."""
+
+    def __init__(self) -> None:
+        self._made: dict[str, tuple[Manifest, pb.Recording]] = {}
+        """By ID, with the manifest that the message is of."""
+
+    def of(self, status_reader: StatusReader, manifest: Manifest) -> pb.Recording:
+        """Returns the message of a recording, without its files and gaps; not to be changed."""
+        if manifest.state.open:
+            return recording(status_reader, manifest)
+        made = self._made.get(manifest.id)
+        if made is None or made[0] is not manifest:
+            made = manifest, recording(status_reader, manifest)
+            self._made.pop(manifest.id, None)
+            self._made[manifest.id] = made
+            if len(self._made) > MOST_MADE:
+                del self._made[next(iter(self._made))]
+        return made[1]
+
+
+def watch_state(
+    status_reader: StatusReader, settings: RecorderSettings, messages: RecordingMessages
+) -> recorder_pb.WatchStateResponse:
     """Returns the message that the gateway watches."""
     newest = status_reader.newest
     message = recorder_pb.WatchStateResponse(
         instance_id=status_reader.run_id,
         status=status(status_reader, settings),
-        newest=recording(status_reader, newest) if newest else None,
+        newest=messages.of(status_reader, newest) if newest else None,
         messages_dropped=status_reader.dropped,
         disk_free_bytes=status_reader.room.disk.free_bytes,
         disk_size_bytes=status_reader.room.disk.size_bytes,
         disk_short=status_reader.disk_short,
-        ended=[recording(status_reader, each) for each in status_reader.recently_ended],
+        ended=[messages.of(status_reader, each) for each in status_reader.recently_ended],
         uncounted_gaps=status_reader.losses.uncounted,
         ring_failures=status_reader.ring_failures,
     )

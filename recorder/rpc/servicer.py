@@ -60,6 +60,7 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         self._status_reader = status_reader
         self._settings = settings
         self._readers = readers
+        self._messages = mapping.RecordingMessages()
         self._bundles = BundleReader(RunBundles(settings.run_bundles), readers.looks, sums)
         self._exporter = Exporter(
             status_reader,
@@ -83,7 +84,7 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
     ) -> AsyncIterator[recorder_pb.WatchStateResponse]:
         """Streams the state, now and on every change; a slow reader skips outdated states."""
         async for _ in self._status_reader.changes.now_and_on_change(self._heartbeat_s):
-            yield mapping.watch_state(self._status_reader, self._settings)
+            yield mapping.watch_state(self._status_reader, self._settings, self._messages)
 
     async def StartRecording(  # noqa: N802  # the schema names it
         self, request: pb.StartRecordingRequest, _context: grpc.aio.ServicerContext[Any, Any]
@@ -212,9 +213,9 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         return mapping.recording(self._status_reader, result.recording) if result.recording else None
 
     def _message(self, each: Manifest | Bundle) -> pb.Recording:
-        return (
-            mapping.bundle(each) if isinstance(each, Bundle) else mapping.recording(self._status_reader, each)
-        )
+        if isinstance(each, Bundle):
+            return mapping.bundle(each)
+        return self._messages.of(self._status_reader, each)
 
     async def _bundle(self, recording_id: str) -> Bundle | None:
         return None if self._status_reader.has(recording_id) else await self._bundles.get(recording_id)

@@ -67,7 +67,7 @@ def test_an_idle_recorder(monkeypatch: pytest.MonkeyPatch) -> None:
     async def check() -> None:
         servicer = RecorderServicer.__new__(RecorderServicer)
         servicer._status_reader = cast("Any", SimpleNamespace(changes=Broadcast(), writes=False))
-        servicer._settings = cast("Any", None)
+        servicer._settings = servicer._messages = cast("Any", None)
         reports = servicer.WatchState(recorder_pb.WatchStateRequest(), NO_CONTEXT)
         assert await longest_gap_s(reports) * LATE_REPORTS < SILENCE_S
 
