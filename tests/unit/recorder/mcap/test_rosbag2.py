@@ -2,14 +2,16 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import pytest
 import yaml
 from rosbags.interfaces import ConnectionExtRosbag2, QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
 
 from recorder.mcap.rosbag2 import FILE_NAME, metadata
 from recorder.mcap.writer import SegmentWriter
-from recorder.values import Channel, SegmentSummary
+from recorder.values import Channel, ChannelSummary, SegmentSummary
 from tests.support.segments import BYTE, STRING, string_sample
 
 QOS = """\
@@ -71,3 +73,34 @@ def test_nothing_recorded_is_an_empty_bag() -> None:
     information = yaml.safe_load(metadata([]))["rosbag2_bagfile_information"]
     assert information["message_count"] == 0
     assert information["relative_file_paths"] == []
+
+
+def test_the_qos_of_a_topic_is_read_once_however_many_files_there_are(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Reading YAML takes milliseconds, and nothing else is done while a recording ends."""
+    read: list[str] = []
+    load = yaml.safe_load
+
+    def counted(text: str) -> Any:
+        read.append(text)
+        return load(text)
+
+    monkeypatch.setattr(yaml, "safe_load", counted)
+    channels = (ChannelSummary("/tf_static", "std_msgs/msg/String", QOS, 1),)
+    segments = [
+        SegmentSummary(Path(f"{number:06}.mcap"), 1, "0" * 64, 1, channels, number + 1, number + 1, ())
+        for number in range(100)
+    ]
+    text = metadata(segments)
+    assert read == [QOS]
+    (topic,) = load(text)["rosbag2_bagfile_information"]["topics_with_message_count"]
+    assert topic["message_count"] == 100
+    assert topic["topic_metadata"]["offered_qos_profiles"][0]["durability"] == "transient_local"
+
+
+def test_metadata_of_another_program_that_is_no_yaml_costs_no_recording() -> None:
+    channels = (ChannelSummary("/a", "std_msgs/msg/String", "a: b: c", 1),)
+    segment = SegmentSummary(Path("000000.mcap"), 1, "0" * 64, 1, channels, 1, 1, ())
+    (topic,) = yaml.safe_load(metadata([segment]))["rosbag2_bagfile_information"]["topics_with_message_count"]
+    assert topic["topic_metadata"]["offered_qos_profiles"] == []
