@@ -264,7 +264,7 @@ class Recorder:
     async def _keep_room(self) -> None:
         """Makes room for what is written. The ring alone deletes no recording: it gives way itself."""
         housekeeping = self._parts.housekeeping
-        await housekeeping.measure()
+        await housekeeping.measure(exact=False)
         need = max(LEAST_ROOM, int(self._outputs.bytes_per_s * _AHEAD_S))
         if not self._outputs.all or housekeeping.room.bytes >= need:
             return

@@ -21,6 +21,8 @@ _T = TypeVar("_T")
 
 LEAST_ROOM: Final = 4 * 1024 * 1024
 """Without so much room no recording begins, and one that runs is stopped."""
+WALK_EVERY_S: Final = 30.0
+"""To sum up files for the quota takes microseconds each: of a large disk, a share of the processor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,12 +51,26 @@ class Housekeeping:
         self._summed_at = -1
         self._deletable_bytes = 0
         self.room = Room()
+        self._exact_bytes = 0
+        self._used_bytes = 0
+        """At the last walk, which was at `_walked_s`, when the disk had `_walked_free` bytes free."""
+        self._walked_s = float("-inf")
+        self._walked_free = 0
 
-    async def measure(self) -> Room:
-        """Measures the room anew; where that is impossible, the former one stands."""
+    async def measure(self, *, exact: bool = True) -> Room:
+        """Measures the room anew; where that is impossible, the former one stands.
+
+        Args:
+            exact: else files are summed up every WALK_EVERY_S alone, and what the disk has less since then
+                counts as written here: the room is rather too small.
+        """
         before = self.room
-        self.room = await attempt("the room on the disk is unknown", self._measured) or before
-        self._to_come.came(self.room.bytes - before.bytes)
+        self.room = (
+            await attempt("the room on the disk is unknown", lambda: self._measured(exact=exact)) or before
+        )
+        if exact or not self._limits.quota_bytes:
+            self._to_come.came(self.room.bytes - self._exact_bytes)
+            self._exact_bytes = self.room.bytes
         return self.room
 
     async def make_room(self, need: int, *, recordings: bool = True) -> bool:
@@ -106,10 +122,17 @@ class Housekeeping:
         going = {file.sha256: file.size for each in recordings if _may_go(each) for file in each.files}
         return sum(size for sha256, size in going.items() if sha256 not in kept)
 
-    def _measured(self) -> Room:
+    def _measured(self, *, exact: bool) -> Room:
         disk = disk_of(self._settings.root)
-        used = used_bytes(self._settings.folders) if self._limits.quota_bytes else 0
+        used = self._used(disk, exact=exact) if self._limits.quota_bytes else 0
         return Room(self._limits.room_bytes(used, disk), disk)
+
+    def _used(self, disk: Disk, *, exact: bool) -> int:
+        now_s = time.monotonic()
+        if exact or now_s - self._walked_s >= WALK_EVERY_S:
+            self._used_bytes = used_bytes(self._settings.folders)
+            self._walked_s, self._walked_free = now_s, disk.free_bytes
+        return self._used_bytes + max(0, self._walked_free - disk.free_bytes)
 
     @property
     def _expected_bytes(self) -> int:
