@@ -119,6 +119,4 @@ class PictureArea(QWidget):
         height = self.toasts.height_for(room)
         middle = max((width - room) // 2, left + _EDGE_PX)
         self.toasts.setGeometry(middle, top + _EDGE_PX, room, min(height, self.height() // 2))
-        size = self.key_help.sizeHint().boundedTo(self.size())
-        corner = (self.width() - size.width()) // 2, (self.height() - size.height()) // 2
-        self.key_help.setGeometry(*corner, size.width(), size.height())
+        self.key_help.fit(self.size())

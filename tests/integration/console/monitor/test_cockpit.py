@@ -9,7 +9,7 @@ from datetime import datetime
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QObject, QRect, Qt
+from PySide6.QtCore import QObject, QPoint, QRect, Qt
 from PySide6.QtGui import QImage, QShortcut
 from PySide6.QtWidgets import QLabel, QPushButton, QWidget
 from shiboken6 import isValid
@@ -423,6 +423,49 @@ def test_the_keys_are_shown(cockpit: Cockpit, key: Qt.Key) -> None:
     keep_screenshot(cockpit.window, "keys")
     cockpit.press(Qt.Key.Key_Escape)
     assert not keys.isVisible()
+
+
+@pytest.mark.parametrize("size", [(1024, 600), WINDOW], ids=str)
+def test_every_key_can_be_read_in_a_small_window(cockpit: Cockpit, size: tuple[int, int]) -> None:
+    """None is cut off at the right, and those below are reached with the keyboard alone."""
+    cockpit.sized(*size)
+    picture, keys = cockpit.window.picture, cockpit.window.picture.key_help
+    cockpit.press(Qt.Key.Key_F1)
+    until(keys.isVisible, "the list of keys")
+    let_pass(0.3)
+    assert picture.rect().contains(keys.geometry())
+    keep_screenshot(cockpit.window, f"keys-{size[0]}x{size[1]}")
+    view, content = keys.area.viewport(), keys.area.widget()
+    assert content
+    labels = content.findChildren(QLabel)
+    texts = {label.text() for label in labels}
+    assert texts > {key.does for key in cockpit_keys(cockpit.window, cockpit.window)}
+    assert all(label.width() >= label.sizeHint().width() for label in labels)
+
+    def read() -> set[str]:
+        boxes = ((each.text(), QRect(each.mapTo(view, QPoint()), each.size())) for each in labels)
+        return {text for text, box in boxes if view.rect().contains(box)}
+
+    assert keys.area.hasFocus()
+    seen = read()
+    for _ in range(10):
+        press(keys.area, Qt.Key.Key_PageDown)
+        seen |= read()
+    assert seen == texts
+
+
+def test_the_list_of_keys_gives_the_focus_back(cockpit: Cockpit) -> None:
+    """Letters typed afterwards are keys again, not text."""
+    window = cockpit.window
+    window.preview.switch.setFocus()
+    cockpit.press(Qt.Key.Key_F1)
+    until(window.picture.key_help.area.hasFocus, "the list has it")
+    cockpit.press(Qt.Key.Key_Escape)
+    until(window.preview.switch.hasFocus, "the button has it again")
+    window.preview.switch.clearFocus()
+    cockpit.press(Qt.Key.Key_F1)
+    cockpit.press(Qt.Key.Key_F1)
+    assert window.focusWidget() is None
 
 
 def test_every_key_of_the_list_is_bound_and_no_key_twice(cockpit: Cockpit) -> None:
