@@ -13,6 +13,7 @@ from console.client import (
     Clock,
     DesiredPreview,
     GatewayError,
+    InvalidRequest,
     NotAllowed,
     NotTrusted,
     Offset,
@@ -128,7 +129,10 @@ class Conversation:
         self._retry = retry
         self._feedback = feedback
         self._snapshot_events: SnapshotEvents | None = None
+        """Finds them while the gateway does not stream them."""
         self._answering = asyncio.Event()
+        self._lost = asyncio.Event()
+        """The opposite, from the first error on."""
         self._retry_now = asyncio.Event()
         self._requested = asyncio.Event()
 
@@ -169,6 +173,7 @@ class Conversation:
     async def _stream_events(self) -> None:
         """Logs each event once. A gateway that can't stream them lists the newest in its snapshots."""
         position: results.EventPosition | None = None
+        listed = SnapshotEvents()
         backoff = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S)
         while True:
             try:
@@ -179,8 +184,15 @@ class Conversation:
                     if line := line_of(item, time.time()):
                         self._log([line])
             except Unsupported:
-                self._snapshot_events = SnapshotEvents()
-                return
+                # Until the connection is lost: the gateway that answers then may be a newer one.
+                self._snapshot_events = listed
+                await self._lost.wait()
+                self._snapshot_events = None
+                await self._answering.wait()
+            except InvalidRequest:
+                # A position that this gateway does not take would be refused for ever.
+                position = None
+                await asyncio.sleep(backoff.next_s())
             except GatewayError:
                 # The status task reports why there is no connection, and one retrying task is enough.
                 await asyncio.sleep(backoff.next_s())
@@ -261,6 +273,7 @@ class Conversation:
 
     def _on_snapshot(self, snapshot: results.OverlaySnapshot, answer_ms: float) -> None:
         self._answering.set()
+        self._lost.clear()
         self._retry.reset()
         now_s, before = time.monotonic(), self._latest.get().link
         since_s = before.since_s if before.state is LinkState.CONNECTED else now_s
@@ -273,6 +286,7 @@ class Conversation:
 
     def _on_error(self, error: GatewayError, pause_s: float) -> None:
         self._answering.clear()
+        self._lost.set()
         state = self._latest.get()
         before = state.link
         link = Link(
