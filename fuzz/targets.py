@@ -210,7 +210,7 @@ def video_stream(data: bytes) -> None:
             for each in reorder.put(packet[0], packet[1:], now_s) + reorder.expire(now_s):
                 delivered += 1 + each.missing
                 if each.missing:
-                    stream.damage()
+                    stream.skip(each.missing)
                 for unit in stream.feed(each.payload):
                     assert unit.data
                     assert unit.pts_ticks is None or 0 <= unit.pts_ticks < WRAP_TICKS

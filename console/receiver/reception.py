@@ -174,7 +174,7 @@ class Reception:
     def _decode(self, delivered: Sequence[Delivered]) -> None:
         for each in delivered:
             if each.missing:
-                self._stream.damage()
+                self._stream.skip(each.missing)
             self._sink.record(each.payload)
             for unit in self._stream.feed(each.payload):
                 self._newest = unit

@@ -20,6 +20,10 @@ _LARGEST_UNIT_BYTES: Final = 4 << 20
 """An access unit that is larger is damage: 4 MiB is more than a second of any profile."""
 _PES_HEADER_BYTES: Final = 9
 """Up to PES_header_data_length."""
+_MOST_PACKETS: Final = 7
+"""In one payload of SRT: 1456 bytes at most."""
+_COUNTER_TURN: Final = 16
+"""continuity_counter has 4 bits (2.4.3.3)."""
 _START_CODE: Final = b"\0\0\1"
 """Of PES packets and of NAL units."""
 _VIDEO_ID: Final = 0xE0
@@ -66,6 +70,8 @@ class TransportStream:
         """The latest section by PID: one that has not changed is not read again."""
         self._codec = ""
         self._counter = -1
+        self._skipped = 0
+        """Payloads that are missing since the last packet of the video."""
         self._parts: list[bytes] = []
         self._size = 0
         self._expected = 0
@@ -78,10 +84,20 @@ class TransportStream:
         self.newest_pts: int | None = None
 
     def damage(self) -> None:
-        """Notes that packets are missing here."""
-        self._counter = -1
+        """Notes that packets of the video are missing here."""
+        self._counter, self._skipped = -1, 0
         self._discard()
         self._tear()
+
+    def skip(self, payloads: int) -> None:
+        """Notes that payloads are missing here; the next packet of the video shows whether it lost any.
+
+        A payload may carry nothing but a clock reference, for which continuity_counter does not advance
+        (2.4.3.3): its loss damages no frame. After so many that the counter may have gone round it is damage.
+        """
+        self._skipped += payloads
+        if self._skipped * _MOST_PACKETS >= _COUNTER_TURN:
+            self.damage()
 
     def feed(self, payload: bytes) -> list[AccessUnit]:
         """Takes whole transport stream packets; returns the access units that end in them.
@@ -120,7 +136,10 @@ class TransportStream:
         if counter == last and not announced:
             return  # The same packet again, as 2.4.3.3 permits.
         self._counter = counter
-        if start > end or (last >= 0 and counter != (last + 1) & 0x0F and not announced):
+        skipped, self._skipped = self._skipped, 0
+        # Where a discontinuity is announced, the counter does not show what was lost.
+        lost = skipped > 0 if announced else counter != (last + 1) & 0x0F
+        if start > end or (last >= 0 and lost):
             self._discard()
             self._tear()
         if flags & 0x40:

@@ -54,6 +54,12 @@ class Writer:
             self._packet(self.video_pid, pes[at : at + 184], starts=at == 0) for at in range(0, len(pes), 184)
         ]
 
+    def reference(self, ticks: int) -> bytes:
+        """Returns a packet with a PCR and no payload, for which the counter stands still (2.4.3.3)."""
+        counter = (self._counters.get(self.video_pid, 0) - 1) % 16
+        head = bytes([0x47, self.video_pid >> 8, self.video_pid & 0xFF, 0x20 | counter])
+        return head + (bytes([183, 0x10]) + (ticks << 15 | 0x7E00).to_bytes(6)).ljust(184, b"\xff")
+
     def _section(self, pid: int, table: int, content: bytes, current: bool) -> bytes:
         body = b"\0\1" + bytes([0xC0 | current]) + b"\0\0" + content
         section = bytes([table]) + (0xB000 | len(body) + 4).to_bytes(2) + body

@@ -158,6 +158,23 @@ def test_after_a_packet_is_given_up_no_torn_frame_is_decoded(played: Played) -> 
     assert len(played.requests_s) <= 1
 
 
+def test_a_lost_clock_reference_tears_no_picture(played: Played) -> None:
+    """At low frame rates there are some between the frames, each in a datagram of its own."""
+    writer = Writer()
+    for frame in range(30):
+        key = frame % GOP == 0
+        unit = writer.unit(coded_frame("h264", frame, key=key), frame * TICKS)
+        content = (writer.tables() if key else b"") + b"".join(unit)
+        played.packets.append((100 + frame / 30, 2 * frame, content))
+        if frame != 7:
+            reference = writer.reference(frame * TICKS)
+            played.packets.append((100 + (frame + 0.5) / 30, 2 * frame + 1, reference))
+    found = played.run(on_picture_lost=played.request)
+    assert played.shown == list(range(30))
+    assert (found.given_up, found.dropped_frames) == (1, 0)
+    assert played.requests_s == []
+
+
 def test_a_key_frame_is_requested_at_once_and_again_while_none_comes(played: Played) -> None:
     send(played, 60, lose=lambda frame, packet: frame >= 7 and packet == 1)
     played.until_s = 102.0

@@ -80,11 +80,54 @@ def test_from_a_damaged_unit_on_none_is_shown_until_a_key_frame(noted: bool) -> 
     assert (reader.breaks, reader.dropped_units) == (1, 3)
 
 
-def test_a_lost_end_is_noticed_although_nothing_is_missing_after_it() -> None:
+@pytest.mark.parametrize("known", [True, False], ids=["of the video", "of a payload"])
+def test_a_lost_end_is_noticed_although_nothing_is_missing_after_it(known: bool) -> None:
     reader, frames = TransportStream(), stream(Writer(), 7)
     fed(reader, frames[0])
     fed(reader, frames[1][:-1])
-    reader.damage()
+    if known:
+        reader.damage()
+    else:
+        reader.skip(1)
+    assert numbers([unit for frame in frames[2:] for unit in fed(reader, frame)]) == [5, 6]
+
+
+def test_the_loss_of_a_clock_reference_costs_no_frame() -> None:
+    """Between the frames of a slow stream there are some, each a payload of its own."""
+    reader, writer, shown = TransportStream(), Writer(), []
+    shown += fed(reader, [writer.tables()])
+    for number in range(12):
+        shown += fed(reader, writer.unit(coded_frame("h264", number, key=number == 0), number * 3000))
+        reference = writer.reference(number * 3000)
+        if number % 2:
+            reader.skip(1)
+        else:
+            assert reader.feed(reference) == []
+    assert numbers(shown) == list(range(12))
+    assert (reader.torn, reader.breaks, reader.dropped_units) == (False, 0, 0)
+
+
+@pytest.mark.parametrize("payloads", [(3,), (1, 2)], ids=str)
+def test_so_many_missing_payloads_that_the_counter_may_have_gone_round_are_damage(
+    payloads: tuple[int, ...],
+) -> None:
+    reader, frames = TransportStream(), stream(Writer(), 7)
+    fed(reader, frames[0])
+    for each in payloads:
+        reader.skip(each)
+    assert reader.torn
+    assert numbers([unit for frame in frames[1:] for unit in fed(reader, frame)]) == [5, 6]
+
+
+def test_missing_payloads_before_an_announced_discontinuity_are_damage() -> None:
+    """The counter begins anew there, and may do so with the number that would be next."""
+    reader, frames = TransportStream(), stream(Writer(), 7)
+    fed(reader, frames[0])
+    last = bytearray(frames[1][-1])
+    last[5] |= 0x80
+    fed(reader, frames[1][:-1])
+    reader.skip(1)
+    assert reader.feed(bytes(last)) == []
     assert numbers([unit for frame in frames[2:] for unit in fed(reader, frame)]) == [5, 6]
 
 
@@ -175,7 +218,7 @@ def test_any_loss_leaves_only_decodable_units(lost: set[int], noted: bool, sized
             if packet[2] == VIDEO_PID and index in lost:
                 whole[-1] = False
                 if noted:
-                    reader.damage()
+                    reader.skip(1)
             else:
                 shown += reader.feed(packet)
     decodable = [number for number in range(17) if all(whole[number - number % GOP : number + 1])]
