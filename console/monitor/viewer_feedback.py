@@ -6,20 +6,37 @@ from collections.abc import Callable
 from typing import Final, Protocol
 
 from common.token_bucket import TokenBucket
-from console.client import GatewayError, PictureReport, Unsupported, results
+from console.client import Clock, GatewayError, PictureReport, Unsupported, results
 
 _REPORT_S: Final = 1.0
 _BURST: Final = 3
 _REQUEST_EVERY_S: Final = 0.34
 """The robot takes three requests at once of one connection, and three a second in the long run. Further
 losses meanwhile share the next one."""
-_ANSWERED_WITHIN_S: Final = 1.0
+_LEAST_ANSWER_S: Final = 0.4
+"""Room for one repetition of a lost segment: TCP waits for 200 ms at least (RFC 6298, Linux's minimum)."""
+_LONGEST_ANSWER_S: Final = 1.0
 _FAILED_FOR_S: Final = 5.0
 """After a request that failed, for whatever reason, a new connection to the stream is the quicker way."""
 
 
+def answer_within_s(rtt_s: float | None) -> float:
+    """Returns how long the answer to a request is waited for, in seconds.
+
+    Meanwhile no picture is shown, so it is not longer than a gateway that works takes at this round trip.
+
+    Args:
+        rtt_s: the shortest of the last calls; None if unknown.
+    """
+    return _LONGEST_ANSWER_S if rtt_s is None else min(_LEAST_ANSWER_S + 2 * rtt_s, _LONGEST_ANSWER_S)
+
+
 class FeedbackClient(Protocol):
-    """The calls of `console.client.AsyncGatewayClient` that are made here."""
+    """What is used here of `console.client.AsyncGatewayClient`."""
+
+    @property
+    def clock(self) -> Clock:
+        """The estimate of the robot's clock."""
 
     async def request_key_frame(self, newest_pts: int | None = ...) -> results.KeyFrameAnswer:
         """Requests a key frame."""
@@ -82,7 +99,7 @@ class ViewerFeedback:
 
     async def _send_request(self, client: FeedbackClient) -> None:
         try:
-            async with asyncio.timeout(_ANSWERED_WITHIN_S):
+            async with asyncio.timeout(answer_within_s(_rtt_s(client))):
                 await client.request_key_frame(self._newest_pts)
         except Unsupported:
             self._known = False
@@ -103,3 +120,9 @@ class ViewerFeedback:
 
 def _take(bucket: TokenBucket) -> bool:
     return bucket.take(time.monotonic(), capacity=_BURST, refill_per_s=1 / _REQUEST_EVERY_S)
+
+
+def _rtt_s(client: FeedbackClient) -> float | None:
+    """Returns the round trip to the gateway; half of it bounds the error of the clock's estimate."""
+    offset = client.clock.offset(time.monotonic())
+    return 2 * offset.error_s if offset else None

@@ -23,11 +23,14 @@ from console.client import (
     EventPosition,
     FaultSeverity,
     GatewayError,
+    GatewayFailed,
+    InvalidRequest,
     KeyFrameAnswer,
     NotAllowed,
     Offset,
     Outage,
     OverlaySnapshot,
+    Overloaded,
     PictureReport,
     PreviewChange,
     PreviewProfile,
@@ -41,6 +44,7 @@ from console.client.results import EventKind, RobotTime, StopReset, TeleopAnswer
 from console.monitor.conversation import RetryBackoff
 from console.monitor.link import LinkState
 from console.monitor.monitor_state import MonitorState
+from console.monitor.viewer_feedback import answer_within_s
 from console.monitor.worker import Worker
 from tests.support.played_recordings import PlayedRecordings
 from tests.support.snapshots import event, snapshot
@@ -400,6 +404,44 @@ def test_a_gateway_that_streams_no_events_is_read_from_its_snapshots() -> None:
         assert texts(worker) == ["preview running"]
 
 
+@pytest.mark.parametrize(
+    "error",
+    [Overloaded("too many"), Unreachable("gone"), DeadlineExceeded("late"), GatewayFailed("a defect")],
+    ids=lambda error: type(error).__name__,
+)
+def test_events_are_asked_for_again_after_an_error_and_a_pause(error: GatewayError) -> None:
+    robot = PlayedRobot()
+    robot.streamed = [error]
+    with following(robot) as worker:
+        wait_until(lambda: robot.asked_after, "it asks")
+        asked_s = time.monotonic()
+        wait_until(lambda: len(robot.asked_after) > 1, "it asks again")
+        assert time.monotonic() - asked_s > 0.4
+        robot.streamed = [happened(1)]
+        wait_until(lambda: texts(worker) == ["error: odometry: event 1"], "the event")
+
+
+def test_a_position_that_is_refused_is_not_asked_for_again() -> None:
+    robot = PlayedRobot()
+    robot.streamed = [happened(7), InvalidRequest("this run has not reached it")]
+    with following(robot):
+        wait_until(lambda: len(robot.asked_after) > 1, "it asks again")
+        assert robot.asked_after[:2] == [None, None]
+
+
+def test_a_gateway_that_streams_events_after_its_update_is_asked_for_them() -> None:
+    robot = PlayedRobot()
+    robot.streamed = [Unsupported("an old gateway")]
+    with following(robot, pause_s=AT_ONCE_S) as worker:
+        reached(worker, LinkState.CONNECTED)
+        wait_until(lambda: robot.asked_after, "it asks")
+        robot.streamed = [happened(1)]
+        robot.error = robot.ping_error = Unreachable("it is started anew")
+        reached(worker, LinkState.LOST)
+        robot.error = robot.ping_error = None
+        wait_until(lambda: texts(worker) == ["error: odometry: event 1"], "the event")
+
+
 def test_it_ends_in_the_middle_of_a_call(robot: PlayedRobot) -> None:
     robot.hangs = robot.requests_hang = True
     with following(robot) as worker:
@@ -522,12 +564,27 @@ def test_a_request_that_failed_leaves_it_to_a_new_connection_to_the_stream(
 
 
 def test_a_request_that_is_not_answered_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("console.monitor.viewer_feedback._ANSWERED_WITHIN_S", 0.05)
+    round_trips_s: list[float | None] = []
+
+    def within_s(rtt_s: float | None) -> float:
+        round_trips_s.append(rtt_s)
+        return 0.05
+
+    monkeypatch.setattr("console.monitor.viewer_feedback.answer_within_s", within_s)
     robot = PlayedRobot()
     robot.key_frames_hang = True
     with following(robot) as worker:
+        wait_until(worker.clock_offset, "a ping")
         wait_until(lambda: worker.request_key_frame(1), "it takes requests")
         wait_until(lambda: not worker.takes_requests(), "it does not any more")
+    assert round_trips_s == [pytest.approx(0.0, abs=0.01)], "as the pings, which this robot answers at once"
+
+
+@pytest.mark.parametrize(
+    ("rtt_s", "expected_s"), [(None, 1.0), (0.0, 0.4), (0.02, 0.44), (0.2, 0.8), (0.5, 1.0)]
+)
+def test_an_answer_is_waited_for_by_the_round_trip(rtt_s: float | None, expected_s: float) -> None:
+    assert answer_within_s(rtt_s) == pytest.approx(expected_s)
 
 
 def test_an_older_robot_is_asked_once() -> None:
