@@ -4,6 +4,7 @@ import time
 from dataclasses import dataclass
 from typing import Final, Self
 
+_NS_PER_S: Final = 1_000_000_000
 _SUSPENDED_NS: Final = 50_000_000
 """Shorter than any suspend, and than any deadline of driving."""
 
@@ -40,3 +41,15 @@ class SuspendWatch:
         """Returns whether the computer was suspended since the last call."""
         before, self._offset = self._offset, _Offset.read()
         return self._offset.least_ns - before.most_ns > _SUSPENDED_NS
+
+
+class SuspendedTime:
+    """Measures how long the computer has been suspended since this was made."""
+
+    def __init__(self) -> None:
+        self._begin = _Offset.read()
+
+    def seconds(self) -> float:
+        """Returns the time so far, 0 without a suspend."""
+        grown_ns = _Offset.read().least_ns - self._begin.most_ns
+        return grown_ns / _NS_PER_S if grown_ns > _SUSPENDED_NS else 0.0

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from itertools import takewhile
 from typing import Final
 
+from common.suspend import SuspendedTime
 from console.client import Offset, PictureDelivery, PictureReport, PreviewStatus
 from console.receiver.delivery import Delivery, DeliveryChoice
 from console.receiver.frame import Frame
@@ -78,6 +79,8 @@ class PictureMeter:
         self._latest: ShownPicture | None = None
         """The picture on the screen; None while none is, or its age is unknown."""
         self._reported_s = 0.0
+        self._suspended = SuspendedTime()
+        """Since the latest picture was shown."""
 
     def robot_now_ns(self) -> int | None:
         """Returns the estimate of the robot's monotonic clock; None while there is none."""
@@ -98,7 +101,7 @@ class PictureMeter:
         picture = ShownPicture(now_s, max(0.0, age_ms), offset.error_s * _MS_PER_S, own_ms, frame.capture_ns)
         with self._lock:
             self._shown.append(picture)
-            self._latest = picture
+            self._latest, self._suspended = picture, SuspendedTime()
 
     def forget(self) -> None:
         """Notes that no picture is on the screen any more; history and summary keep those that were."""
@@ -107,7 +110,7 @@ class PictureMeter:
 
     def reading(self) -> PictureReading:
         """Returns the reading of this moment."""
-        shown, now_s = self.latest(), time.monotonic()
+        shown, now_s = self.latest(), self._now_s()
         return reading(shown, self._delivery(), self._preview(), now_s, self._received())
 
     def latest(self) -> ShownPicture | None:
@@ -139,7 +142,7 @@ class PictureMeter:
 
     def worst_ms(self, within_s: float) -> float | None:
         """Returns the largest age of the last `within_s` seconds; None when no picture is on the screen."""
-        now_s, latest = time.monotonic(), self.latest()
+        now_s, latest = self._now_s(), self.latest()
         if latest is None:
             return None
         recent = takewhile(lambda each: each.at_s > now_s - within_s, reversed(self._pictures()))
@@ -170,7 +173,7 @@ class PictureMeter:
         if latest is None:
             return None
         since = list(takewhile(lambda each: each.at_s > since_s, reversed(self._pictures())))
-        age_ms = max([age_now_ms(latest, now_s), *(each.age_ms for each in since)])
+        age_ms = max([age_now_ms(latest, self._now_s()), *(each.age_ms for each in since)])
         of_link_ms = max([link_age_ms(latest, now_s, self._received()), *(each.link_ms for each in since)])
         delivery = self._delivery()
         rtt_ms = delivery.rtt_ms if delivery else None
@@ -186,6 +189,10 @@ class PictureMeter:
             delivery=PictureDelivery.DIRECT if direct else PictureDelivery.SRT_LATENCY,
             link_age_ms=min(_LONGEST_MS, round(of_link_ms)),
         )
+
+    def _now_s(self) -> float:
+        """Returns the time by which the picture on the screen gets older: in a suspend, too."""
+        return time.monotonic() + self._suspended.seconds()
 
     def _pictures(self) -> tuple[ShownPicture, ...]:
         with self._lock:

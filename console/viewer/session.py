@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Final, Protocol, TypeAlias
 
 from common.errors import UserError
+from common.suspend import SuspendedTime
 from console.capture_time import CaptureClock
 from console.client import GatewayError, PreviewState, PreviewStatus
 from console.receiver.address import StreamAddress
@@ -115,6 +116,8 @@ class VideoSession:
         self._inputs = PlaybackInputs()
         self._address: StreamAddress | None = None
         self._latest: Frame | None = None
+        self._suspended = SuspendedTime()
+        """Since the latest frame came."""
         self._listeners: list[FrameListener] = []
         self._closing = False
         self._thread = threading.Thread(target=self._run, name="video-session", daemon=True)
@@ -164,7 +167,8 @@ class VideoSession:
 
     def playback(self) -> Playback:
         """Returns the state of the video at this moment."""
-        return playback(self._inputs, time.monotonic())
+        # In a suspend the monotonic clock stands still, and the frame on the screen gets older all the same.
+        return playback(self._inputs, time.monotonic() + self._suspended.seconds())
 
     @property
     def redials(self) -> int:
@@ -267,7 +271,7 @@ class VideoSession:
         with self._changed:
             if self._address is None:
                 return
-            self._latest = frame
+            self._latest, self._suspended = frame, SuspendedTime()
             self.frames += 1
             self._inputs = replace(self._inputs, frame_s=frame.arrival_s, stream_error=None, blocked=False)
             self._backoff.reset()

@@ -3,7 +3,7 @@
 import pytest
 
 from common import suspend
-from common.suspend import SuspendWatch
+from common.suspend import SuspendedTime, SuspendWatch
 
 S = 1_000_000_000
 
@@ -54,3 +54,14 @@ def test_a_process_that_is_interrupted_while_it_reads_was_not_suspended(clocks: 
 def test_the_real_clocks_agree() -> None:
     watch = SuspendWatch()
     assert not any(watch.resumed() for _ in range(1000))
+
+
+def test_the_time_of_all_suspends_is_measured(clocks: Clocks) -> None:
+    suspended = SuspendedTime()
+    clocks.monotonic += 10 * S
+    assert suspended.seconds() == 0
+    clocks.suspended += 3600 * S
+    assert suspended.seconds() == 3600
+    clocks.suspended += 60 * S
+    clocks.interrupted_ns = S
+    assert 3658 <= suspended.seconds() <= 3660

@@ -8,6 +8,7 @@ from console.client import Offset, PictureDelivery
 from console.receiver.delivery import Delivery, DeliveryChoice
 from console.viewer.picture_meter import HISTORY_SLOTS, PictureMeter
 from console.viewer.picture_reading import AgeCause
+from tests.support.suspends import PlayedSuspends
 from tests.unit.console.receiver.frames import frame
 
 OFFSET_S = 3600.0
@@ -106,6 +107,23 @@ def test_a_frozen_picture_is_reported_with_its_age_now(played: Played) -> None:
     report = played.meter.report()
     assert report
     assert report.picture_age_ms == 60_000
+
+
+def test_a_picture_of_before_a_suspend_is_older_by_it(
+    played: Played, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The monotonic clock stood still. It is no age of the link, which would lower the bit rate of all."""
+    suspends = PlayedSuspends()
+    monkeypatch.setattr("console.viewer.picture_meter.SuspendedTime", suspends)
+    played.show(20)
+    suspends.total_s += 4.0
+    assert played.meter.reading().age_ms == pytest.approx(4020, abs=1e-3)
+    assert played.meter.worst_ms(0.5) == pytest.approx(4020, abs=1e-3)
+    report = played.meter.report()
+    assert report
+    assert (report.picture_age_ms, report.link_age_ms) == (4020, 20)
+    played.show(30)
+    assert played.meter.reading().age_ms == pytest.approx(30, abs=1e-3)
 
 
 def test_time_on_this_computer_is_not_of_the_link(played: Played) -> None:

@@ -16,6 +16,7 @@ from console.receiver.frame_queue import FrameQueue
 from console.receiver.options import ReceiverOptions
 from console.viewer.playback import PlaybackState
 from console.viewer.session import VideoSession
+from tests.support.suspends import PlayedSuspends
 from tests.support.waiting import wait_until
 from tests.unit.console.receiver.frames import frame
 from tests.unit.console.viewer.previews import preview
@@ -274,3 +275,33 @@ def test_a_connection_that_is_made_anew_by_itself_is_not_silent(
     exchange.show()
     wait_until(lambda: session.frames == 2, "a frame")
     called(exchange, 2)
+
+
+def test_a_frame_of_before_a_suspend_is_frozen_for_as_long(
+    session: VideoSession, exchange: Exchange, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    suspends = PlayedSuspends()
+    monkeypatch.setattr("console.viewer.session.SuspendedTime", suspends)
+    session.follow(preview(PreviewState.RUNNING))
+    called(exchange, 1)
+    exchange.show()
+    wait_until(session.latest_frame, "a frame")
+    assert session.playback().state is PlaybackState.LIVE
+    suspends.total_s += 3600
+    now = session.playback()
+    assert now.state is PlaybackState.FROZEN
+    assert now.frame_age_s is not None
+    assert now.frame_age_s > 3600
+    exchange.show()
+    wait_until(lambda: session.playback().state is PlaybackState.LIVE, "live")
+
+
+def test_why_there_was_no_video_is_forgotten_once_the_preview_is_off(session: VideoSession) -> None:
+    session.follow(preview(PreviewState.RUNNING, passphrase="short"))
+    assert session.playback().state is PlaybackState.BLOCKED
+    session.follow(preview(PreviewState.DISABLED))
+    off = session.playback()
+    assert (off.state, off.reason) == (PlaybackState.OFF, "")
+    session.follow(replace(preview(PreviewState.STARTING), endpoint=None))
+    starting = session.playback()
+    assert (starting.state, starting.reason, starting.remedy) == (PlaybackState.CONNECTING, "", "")
