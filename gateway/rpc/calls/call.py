@@ -95,6 +95,11 @@ class CallContext(Call):
         self.responded = False
         self.response = None
 
+    @property
+    def caller(self) -> str:
+        """Whose limits apply: a name on credentials, or without these what a sender can't change at will."""
+        return self.principal.name if self.principal else self.peer.address_prefix
+
     def remaining_s(self) -> float | None:
         """Returns the time until the caller's deadline; None without one."""
         return self.rpc.time_remaining()

@@ -39,7 +39,7 @@ class CallerLimit(Interceptor[CallContext]):
         """
         if not _is_limited(call):
             return None
-        caller = _caller_of(call)
+        caller = call.caller
         try:
             self._shares.take_token(caller)
             if call.method.streaming:
@@ -53,13 +53,9 @@ class CallerLimit(Interceptor[CallContext]):
     def on_end(self, call: CallContext, _error: BaseException | None) -> None:
         """Gives the stream back."""
         if call.method.streaming and _is_limited(call):
-            self._shares.close_stream(_caller_of(call))
+            self._shares.close_stream(call.caller)
 
 
 def _is_limited(call: CallContext) -> bool:
     """Returns whether the caller has a name or an address; at a Unix socket it may have neither."""
     return call.principal is not None or call.peer.ip is not None
-
-
-def _caller_of(call: CallContext) -> str:
-    return call.principal.name if call.principal else call.peer.address_prefix

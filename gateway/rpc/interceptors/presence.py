@@ -70,8 +70,7 @@ class Presence(Interceptor[CallContext]):
     def on_call(self, call: CallContext) -> None:
         """Counts an open stream."""
         name = call.principal.name if call.principal else ""
-        caller = name or call.peer.address_prefix
-        client = self._clients.setdefault(call.peer.address, _Client(self._clock(), name, caller))
+        client = self._clients.setdefault(call.peer.address, _Client(self._clock(), name, call.caller))
         client.streams += 1
 
     def on_end(self, call: CallContext, _error: BaseException | None) -> None:

@@ -32,10 +32,17 @@ class Rank(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class ExportCaller:
-    """Who exports: the name under which its exports are counted, for people, and the rank."""
+    """Who exports.
+
+    Attributes:
+        name: for people.
+        rank: which places it may take.
+        counted_as: whose exports these are (`CallContext.caller`).
+    """
 
     name: str
     rank: Rank
+    counted_as: str
 
 
 class ExportStream:
@@ -70,7 +77,7 @@ class ExportStream:
             DomainError: the recorder refuses, or is gone.
         """
         self._check_free(caller)
-        place = _Place(self._open, caller.name, calls.export(request, caller.name))
+        place = _Place(self._open, caller.counted_as, calls.export(request, caller.name))
         try:
             async for each in place.responses:
                 response = each if isinstance(each, bytes) else b"".join(message_parts(each))
@@ -82,7 +89,7 @@ class ExportStream:
             await place.close()
 
     def _check_free(self, caller: ExportCaller) -> None:
-        if self._open[caller.name] >= MAX_OF_A_CALLER:
+        if self._open[caller.counted_as] >= MAX_OF_A_CALLER:
             raise TooMuchError(
                 f"you have {MAX_OF_A_CALLER} exports running, and no more are allowed; wait until one ends",
                 Reason.TOO_MANY_EXPORTS,

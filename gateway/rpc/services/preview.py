@@ -60,8 +60,7 @@ class PreviewService:
 
     async def report_picture(self, request: ReportPictureRequest, call: CallContext) -> ReportPictureResponse:
         """Takes a viewer's report, and has the worst age of all passed on."""
-        caller = call.principal.name if call.principal else call.peer.address_prefix
-        pictures = self.state.take_picture(caller, request.viewer_id, picture_report(request))
+        pictures = self.state.take_picture(call.caller, request.viewer_id, picture_report(request))
         if pictures.link_age_ms is not None:
             self.feedback.pass_on(pictures.link_age_ms)
         return ReportPictureResponse()

@@ -100,7 +100,7 @@ class RecordingService:
 
     def export_recording(self, request: ExportRecordingRequest, call: CallContext) -> AsyncIterator[bytes]:
         """Yields a header, then the chunks."""
-        caller = ExportCaller(_caller(call), self._rank(call))
+        caller = ExportCaller(_caller(call), self._rank(call), counted_as=call.caller)
         return self._exports.responses(self._configured(), request.SerializeToString(), caller)
 
     async def upload_recording(
