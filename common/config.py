@@ -9,11 +9,13 @@ import yaml
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from pydantic_settings import (
     BaseSettings,
+    EnvSettingsSource,
     PydanticBaseSettingsSource,
     SettingsConfigDict,
     SettingsError,
 )
 
+from common.config_kinds import misfits
 from common.config_problems import first_problem
 from common.errors import ExitCode, UserError
 
@@ -90,7 +92,12 @@ def load(
     """
     values, line_of = _read(path) if path else ({}, _no_line)
     prefix = settings_type.model_config.get("env_prefix", "")
+    remedy = f"Correct it in the file or in the {prefix}* environment variable"
+    if misfit := next(misfits(settings_type, values), None):
+        raise _error(f"{path}{line_of(misfit.location)}: {misfit.text}", remedy)
     try:
+        if misfit := next(misfits(settings_type, EnvSettingsSource(settings_type)()), None):
+            raise _error(f"from the environment: {misfit.text}", remedy)
         settings = settings_type(**_respelled(values, settings_type.spellings))
     except SettingsError as error:
         # A list or a section in a variable that is no JSON; the sentence has the name in quotation marks.
@@ -103,7 +110,7 @@ def load(
         problem = first_problem(error, settings_type)
         raise _error(
             f"{path or 'from the environment'}{line_of(problem.location)}: {problem.text}",
-            f"Correct it in the file or in the {prefix}* environment variable",
+            remedy,
         ) from error
     try:
         for check in checks:

@@ -2,18 +2,23 @@
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, get_args
 
 import pytest
 from pydantic import BaseModel, Field
 from pydantic_settings import SettingsConfigDict
 
+from bridge.config import BridgeSettings
 from common.config import Section, Settings, as_yaml, json_schema, load
 from common.errors import ExitCode, UserError
+from drive.config import DriveSettings
 from gateway.config import GatewaySettings
+from hub.receiver.config import ReceiverSettings
 from preview.config import PreviewSettings
+from recorder.config import RecorderSettings
+from tap.config import TapSettings
 
 
 class _Item(Section):
@@ -36,6 +41,7 @@ class _Settings(Settings):
     folder: Path = Path("/tmp")  # noqa: S108  # a value
     server: _Server = _Server()
     items: tuple[_Item, ...] = ()
+    numbers: Mapping[str, int] = Field(default={})
 
 
 def mistake(tmp_path: Path, text: str) -> str:
@@ -158,6 +164,91 @@ def test_no_mistake_is_explained_in_the_librarys_words(settings_type: type[Setti
         "[Ii]nput should|[Vv]alue error|valid (dict|tuple|string|number|integer)|another value"
     )
     assert [each for each in sentences if library.search(each)] == []
+
+
+PROGRAMS: Final = (
+    GatewaySettings,
+    PreviewSettings,
+    RecorderSettings,
+    DriveSettings,
+    BridgeSettings,
+    ReceiverSettings,
+    TapSettings,
+)
+
+
+def leaves_of(model: type[BaseModel]) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """The keys that hold no section, with what they take."""
+    for name, field in model.model_fields.items():
+        annotation = field.annotation
+        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+            yield from (((field.alias or name, *inner), kind) for inner, kind in leaves_of(annotation))
+        else:
+            yield (field.alias or name,), annotation
+
+
+def refusal_of(settings_type: type[Settings], keys: tuple[str, ...], value: Any, file: Path) -> str:
+    values: Any = value
+    for key in reversed(keys):
+        values = {key: values}
+    file.write_text(json.dumps(values), encoding="utf-8")
+    with pytest.raises(UserError) as raised:
+        load(settings_type, file)
+    return raised.value.what
+
+
+@pytest.mark.parametrize("settings_type", PROGRAMS)
+def test_true_is_no_number_and_no_number_is_true(settings_type: type[Settings], tmp_path: Path) -> None:
+    """Also where it equals the default: True == 1, and False == 0."""
+    checked = 0
+    for keys, kind in leaves_of(settings_type):
+        of_union = {kind, *get_args(kind)}
+        if of_union & {int, float} and bool not in of_union:
+            for value in (True, False):
+                says = refusal_of(settings_type, keys, value, tmp_path / "x.yaml")
+                assert f"key '{'.'.join(keys)}' is {str(value).lower()}, expected: a " in says
+                checked += 1
+        elif bool in of_union:
+            for number in (0, 1, 1.0):
+                says = refusal_of(settings_type, keys, number, tmp_path / "x.yaml")
+                assert f"key '{'.'.join(keys)}' is {number}, expected: true or false" in says
+                checked += 1
+    assert checked > 1
+
+
+def test_a_section_that_equals_its_default_is_checked(tmp_path: Path) -> None:
+    assert mistake(tmp_path, "server: {port: true}") == (
+        ", line 1: key 'server.port' is true, expected: a whole number"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("name: a\nserver:\n  ratio: no", ", line 3: key 'server.ratio' is false, expected: a number, 2.5"),
+        ("enabled: 1", ", line 1: key 'enabled' is 1, expected: true or false"),
+        ("items:\n- kind: a\n- {kind: b, size: yes}", ", line 3: key 'items.1.size' is true, expected: a "),
+        ("numbers: {a: on}", ", line 1: key 'numbers.a' is true, expected: a whole number"),
+    ],
+)
+def test_a_value_of_another_kind_is_not_converted(tmp_path: Path, text: str, says: str) -> None:
+    assert says in mistake(tmp_path, text)
+
+
+def test_a_section_in_the_environment_is_checked_as_a_file_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TESTED__SERVER", '{"port": true}')
+    with pytest.raises(UserError) as raised:
+        load(_Settings, None)
+    assert raised.value.what == (
+        "configuration from the environment: key 'server.port' is true, expected: a whole number"
+    )
+
+
+def test_plain_variables_are_texts_that_are_read_as_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TESTED__SERVER__PORT", "7")
+    monkeypatch.setenv("TESTED__ENABLED", "0")
+    settings = load(_Settings, None)
+    assert (settings.server.port, settings.enabled) == (7, False)
 
 
 def test_what_is_in_effect_reads_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
