@@ -24,7 +24,9 @@ _LONGEST_PAUSE_S: Final = 2.0
 
 
 class Incidents:
-    """Reports each fault of the severity ERROR once, when it is raised or becomes one.
+    """Reports each fault when it is raised, and when it becomes more severe.
+
+    Whether it makes an incident, the recorder's rules decide.
 
     What the recorder does not get within EXPIRED_S is dropped. At most as many wait as faults are listed.
 
@@ -39,7 +41,7 @@ class Incidents:
     def __init__(self, calls: RecorderCalls, clock: Callable[[], float] = time.monotonic) -> None:
         self._calls = calls
         self._clock = clock
-        self._known: frozenset[str] = frozenset()
+        self._known: dict[str, Severity] = {}
         self._waiting: dict[str, tuple[Condition, float]] = {}
         """By fault ID: what to report, and since when."""
         self._added = Broadcast()
@@ -47,17 +49,17 @@ class Incidents:
 
     def take(self, faults: Iterable[Fault]) -> None:
         """Takes the faults of an instant. Never waits."""
-        errors = {
+        present = {
             each.condition.fault_id: each.condition
             for each in faults
-            if each.active
-            and each.condition.severity is Severity.ERROR
-            and each.condition.component not in _WITHOUT
+            if each.active and each.condition.component not in _WITHOUT
         }
         now_s = self._clock()
-        for fault_id in errors.keys() - self._known:
-            self._waiting[fault_id] = errors[fault_id], now_s
-        self._known = frozenset(errors)
+        for fault_id, condition in present.items():
+            known = self._known.get(fault_id)
+            if known is None or condition.severity.rank > known.rank:
+                self._waiting[fault_id] = condition, now_s
+        self._known = {fault_id: condition.severity for fault_id, condition in present.items()}
         if self._waiting:
             self._added.notify_all()
 
@@ -66,7 +68,8 @@ class Incidents:
         backoff = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S)
         while True:
             await self._added.wait_until(lambda: bool(self._waiting))
-            fault_id, (condition, since_s) = next(iter(self._waiting.items()))
+            fault_id, report = next(iter(self._waiting.items()))
+            condition, since_s = report
             if self._clock() - since_s > EXPIRED_S:
                 del self._waiting[fault_id]
                 self.expired += 1
@@ -80,6 +83,9 @@ class Incidents:
             except DomainError as error:
                 _log.warning("no incident was recorded of %s: %s", fault_id, error)
             else:
-                _log.info("fault %s: %s", fault_id, f"incident {incident}" if incident else "no incident")
+                if incident:
+                    _log.info("fault %s: incident %s", fault_id, incident)
             backoff.reset()
-            self._waiting.pop(fault_id, None)
+            # It may have become more severe meanwhile.
+            if self._waiting.get(fault_id) is report:
+                del self._waiting[fault_id]

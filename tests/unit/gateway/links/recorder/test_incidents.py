@@ -38,20 +38,43 @@ async def turns() -> None:
         await asyncio.sleep(0)
 
 
-async def test_each_error_is_reported_once_while_it_lasts() -> None:
+async def test_each_fault_is_reported_once_while_it_lasts() -> None:
     calls: Any = Calls()
     incidents = Incidents(calls)
     running = asyncio.create_task(incidents.run())
     warning = of("preview.fallback", severity=Severity.WARNING)
+    error = replace(warning, condition=replace(warning.condition, severity=Severity.ERROR))
     own = of("recording.disk", component=OWN)
     for _ in range(3):
         incidents.take([FAULT, warning, own, replace(of("old"), cleared_s=2.0)])
         await turns()
-    assert calls.reported == ["vision.silent"]
-    incidents.take([])
-    incidents.take([FAULT, replace(warning, condition=replace(warning.condition, severity=Severity.ERROR))])
+    assert sorted(calls.reported) == ["preview.fallback", "vision.silent"]
+    incidents.take([warning])
+    incidents.take([FAULT, error])
+    incidents.take([FAULT, warning])
     await turns()
-    assert sorted(calls.reported[1:]) == ["preview.fallback", "vision.silent"]
+    assert sorted(calls.reported[2:]) == ["preview.fallback", "vision.silent"]
+    running.cancel()
+
+
+async def test_a_fault_that_becomes_an_error_while_it_is_reported_is_reported_as_one() -> None:
+    calls: Any = Calls()
+    incidents = Incidents(calls)
+    warning = of("preview.fallback", severity=Severity.WARNING)
+    error = replace(warning, condition=replace(warning.condition, severity=Severity.ERROR))
+    severities = []
+
+    async def report_fault(fault: Condition) -> str:
+        severities.append(fault.severity)
+        if fault.severity is Severity.WARNING:
+            incidents.take([error])
+        return ""
+
+    calls.report_fault = report_fault
+    running = asyncio.create_task(incidents.run())
+    incidents.take([warning])
+    await turns()
+    assert severities == [Severity.WARNING, Severity.ERROR]
     running.cancel()
 
 
