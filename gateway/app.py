@@ -13,7 +13,7 @@ from common import heartbeat
 from common.advertisement import Advertisement
 from common.metrics_endpoint import serving_metrics
 from gateway.assembly import Gateway, ThisRobot, build
-from gateway.config import GatewaySettings, SecuritySettings
+from gateway.config import GatewaySettings, SecuritySettings, without_effect
 from gateway.links.preview.control import PreviewLink
 from gateway.platform.advertising import advertise
 from gateway.rpc.server import SERVICE, serving
@@ -32,6 +32,8 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
         UserError: a part can't start.
     """
     _warn_of_exposure(settings.security)
+    for sentence in without_effect(settings):
+        _log.warning("%s", sentence)
     async with running(build(settings, ThisRobot(settings))):
         heartbeat.own().ready()
         await stop.wait()

@@ -12,7 +12,7 @@ from common.config import SettingsConflictError, as_yaml, json_schema
 from common.errors import UserError
 from common.program import bound_arenas, run, run_command_line
 from common.program_options import PrintOption, SchemaOption
-from gateway.config import CONFIG_VARIABLE, GatewaySettings, load_settings
+from gateway.config import CONFIG_VARIABLE, GatewaySettings, load_settings, without_effect
 from gateway.credentials_cli import app as credentials_app
 
 app = typer.Typer(help="The robot's side of the door: ROS 2 in, gRPC out.", no_args_is_help=True)
@@ -58,7 +58,7 @@ def check(config: Config = None, in_effect: PrintOption = False, schema: SchemaO
         from gateway.access.reloader import load_access  # noqa: PLC0415
 
         load_access(*access_files)
-    for line in unchecked:
+    for line in (*unchecked, *without_effect(settings)):
         typer.echo(line, err=True)
     if in_effect:
         typer.echo(as_yaml(settings), nl=False)

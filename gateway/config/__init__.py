@@ -9,6 +9,7 @@ from gateway.config.settings import (
     GatewaySettings,
     PlatformSettings,
     load_settings,
+    without_effect,
 )
 from gateway.config.sources import DEFAULT_SOURCES, SourceSettings
 
@@ -29,4 +30,5 @@ __all__ = [
     "TlsSettings",
     "is_loopback",
     "load_settings",
+    "without_effect",
 ]

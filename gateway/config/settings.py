@@ -1,6 +1,7 @@
 """The whole configuration: one YAML file, overridden by `GATEWAY__...` environment variables."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Final, Literal
 
@@ -20,6 +21,7 @@ from gateway.config.serving import (
     is_loopback,
 )
 from gateway.config.sources import DEFAULT_SOURCES, SourceSettings
+from gateway.status.faults.known import ANY_WORD, known_faults, matches
 from gateway.status.snapshot import Rules, SourceRule
 from gateway.status.sources import MUX_INPUTS
 
@@ -97,6 +99,19 @@ def load_settings(path: Path | None, *checks: Callable[[GatewaySettings], None])
     return load(
         GatewaySettings, path, _check_exposure, _check_discovery, _check_driving, _check_sources, *checks
     )
+
+
+def without_effect(settings: GatewaySettings) -> Iterator[str]:
+    """Yields a sentence for each value that is valid and does nothing."""
+    known = tuple(known_faults([source.spec for source in settings.sources]))
+    for rule in settings.faults.ignored_by_health:
+        if not any(matches(rule, fault_id) for fault_id in known):
+            meant = get_close_matches(rule, [each for each in known if ANY_WORD not in each], n=1)
+            hint = f"; did you mean '{meant[0]}'?" if meant else ""
+            yield (
+                f"faults.ignored_by_health has no effect for '{rule}': no fault of this configuration has "
+                f"that ID, or begins with it{hint}"
+            )
 
 
 def _check_exposure(settings: GatewaySettings) -> None:
