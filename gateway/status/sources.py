@@ -90,7 +90,7 @@ DETECTIONS: Final = SourceSpec(
     # Sent only to watchers that request them: status_stream.py compares them for those.
     in_change_key=False,
 )
-BATTERY: Final = SourceSpec("battery", Battery, stale_after_ms=5000)
+BATTERY: Final = SourceSpec("battery", Battery, stale_after_ms=5000, merge=Battery.merged)
 """The traction battery."""
 DIAGNOSTICS: Final = SourceSpec(
     "diagnostics",

@@ -56,7 +56,10 @@ class Battery:
     """State of one battery.
 
     Attributes:
+        present: whether it is in its place.
         charge_out_of_range: whether it reports a charge that can't be one, which is then unknown.
+        in_percent: whether it has reported a charge as 0 to 100. Its 0.9 may be 0.9 %, or 90 % since its
+            publisher was corrected: from then on its charge is unknown.
     """
 
     present: bool
@@ -64,6 +67,13 @@ class Battery:
     charge_percent: float | None
     charging: bool | None
     charge_out_of_range: bool = False
+    in_percent: bool = False
+
+    def merged(self, newer: "Battery") -> "Battery":
+        """Returns a newer state, read as after this one."""
+        if not self.in_percent or newer.in_percent:
+            return newer
+        return replace(newer, charge_percent=None, charge_out_of_range=True, in_percent=True)
 
 
 @dataclass(frozen=True, slots=True)

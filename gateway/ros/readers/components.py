@@ -21,6 +21,9 @@ from gateway.status.values import (
 _CHARGING: Final = {1: True, 2: False, 3: False, 4: False}
 # A gauge slightly out of range is rounding; one further out measures in another unit.
 _PERCENTAGE_TOLERANCE: Final = 0.05
+# No gauge is wrong by so much: it measures in percent, though what it sends may fall below 1 later.
+_LEAST_IN_PERCENT: Final = 2.0
+_LEAST_VOLTAGE_V: Final = 1.0
 # diagnostic_msgs/DiagnosticStatus: OK = 0, WARN = 1, ERROR = 2, STALE = 3.
 _LEVELS: Final = (DiagnosticLevel.OK, DiagnosticLevel.WARNING, DiagnosticLevel.ERROR, DiagnosticLevel.STALE)
 _MAX_MESSAGE_LENGTH: Final = 300
@@ -41,12 +44,18 @@ def from_vision_perf(message: Any, _source: SourceSettings) -> Vision:
 @reads("sensor_msgs/msg/BatteryState", BATTERY)
 def from_battery_state(message: Any, _source: SourceSettings) -> Battery:
     """Returns the state of one battery. NaN means unknown in every field of this message."""
+    voltage_v, share = finite(message.voltage), message.percentage
+    if not message.present and share == 0:
+        share = math.nan
     return Battery(
-        present=bool(message.present),
-        voltage_v=finite(message.voltage),
-        charge_percent=_percent(message.percentage),
+        # Many publishers leave fields unset, which reads false and 0: a battery with a voltage is there, and
+        # one that says neither that it is there nor more than 0 % has no gauge.
+        present=bool(message.present) or (voltage_v is not None and voltage_v >= _LEAST_VOLTAGE_V),
+        voltage_v=voltage_v,
+        charge_percent=_percent(share),
         charging=_CHARGING.get(int(message.power_supply_status)),
-        charge_out_of_range=_percent(message.percentage) is None and not math.isnan(message.percentage),
+        charge_out_of_range=_percent(share) is None and not math.isnan(share),
+        in_percent=math.isfinite(share) and share >= _LEAST_IN_PERCENT,
     )
 
 

@@ -41,7 +41,8 @@ def platform_faults(
             "battery.out_of_range",
             "power",
             "the robot's battery reports a charge outside its range: it is unknown, and no fault when low",
-            "Have its publisher send percentage as 0 to 1 (sensor_msgs/BatteryState), not as 0 to 100",
+            "Have its publisher send percentage as 0 to 1 (sensor_msgs/BatteryState), not as 0 to 100; "
+            "then restart the gateway",
         )
     yield from _throttling(snapshot, active)
     if snapshot[COMPUTE].freshness.stale or snapshot[NETWORK].freshness.stale:

@@ -13,6 +13,7 @@ from gateway.config import DEFAULT_SOURCES, SourceSettings
 from gateway.ros.readers import reader_for
 from gateway.ros.readers.registry import reads
 from gateway.status import sources as specs
+from gateway.status.board import Board
 from gateway.status.values import (
     Battery,
     CommandSource,
@@ -21,6 +22,7 @@ from gateway.status.values import (
     DiagnosticItem,
     DiagnosticLevel,
     Mode,
+    Received,
     Velocity,
     Vision,
 )
@@ -61,8 +63,10 @@ def detection2d(*hypotheses: tuple[str, float]) -> Thing:
     return Thing(results=results, bbox=bbox, id="")
 
 
-def battery(percentage: float = 0.5, voltage: float = 15.0, status: int = 2) -> Thing:
-    return Thing(present=True, voltage=voltage, percentage=percentage, power_supply_status=status)
+def battery(
+    percentage: float = 0.5, voltage: float = 15.0, status: int = 2, *, present: bool = True
+) -> Thing:
+    return Thing(present=present, voltage=voltage, percentage=percentage, power_supply_status=status)
 
 
 def test_odometry_reads_the_twist() -> None:
@@ -167,6 +171,42 @@ def test_a_charge_out_of_range_is_not_shown_as_full(share: float, percent: float
 )
 def test_charging_is_known_only_where_the_battery_says_so(status: int, charging: bool | None) -> None:
     assert read(BATTERY, battery(status=status)).charging is charging
+
+
+@pytest.mark.parametrize(
+    ("percentage", "voltage", "there", "percent"),
+    [
+        (0.05, 15.0, True, 5.0),
+        (0.0, 15.0, True, None),
+        (0.0, 0.0, False, None),
+        (math.nan, math.nan, False, None),
+        (0.0, 0.9, False, None),
+    ],
+)
+def test_a_battery_that_leaves_present_unset_is_there_if_it_has_a_voltage(
+    percentage: float, voltage: float, there: bool, percent: float | None
+) -> None:
+    value = read(BATTERY, battery(percentage, voltage, present=False))
+    assert (value.present, value.charge_percent, value.charge_out_of_range) == (there, percent, False)
+
+
+def test_a_battery_that_has_sent_percent_is_never_nearly_full_when_it_is_nearly_empty() -> None:
+    """From 57 down to 0.9, which is not 90 %."""
+    board = Board()
+    for at_s, sent in enumerate((57.0, 2.0, 1.2, 1.0, 0.9, math.nan)):
+        board[specs.BATTERY] = Received(read(BATTERY, battery(sent)), float(at_s))
+        shown = board[specs.BATTERY]
+        assert shown is not None
+        assert (shown.value.charge_percent, shown.value.charge_out_of_range) == (None, True)
+
+
+def test_a_gauge_that_is_a_little_out_of_range_once_is_believed_again() -> None:
+    board = Board()
+    for at_s, (sent, percent) in enumerate(((1.2, None), (1.0, 100.0), (-1.0, None), (0.5, 50.0))):
+        board[specs.BATTERY] = Received(read(BATTERY, battery(sent)), float(at_s))
+        shown = board[specs.BATTERY]
+        assert shown is not None
+        assert shown.value.charge_percent == percent
 
 
 def test_a_voltage_that_is_not_known_is_none() -> None:
