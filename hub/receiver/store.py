@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import boto3
 from botocore.config import Config
 from botocore.exceptions import BotoCoreError, ClientError, HTTPClientError
+from botocore.parsers import ResponseParserError
 
 from common.errors import UserError
 from hub.receiver.config import StoreSettings
@@ -112,11 +113,11 @@ class Store:
         try:
             with _problems():
                 found = self._client.head_object(Bucket=self._bucket, Key=key)
+                return StoredObject(found["ContentLength"], found["ETag"])
         except StoreError as error:
             if error.problem is StoreProblem.MISSING:
                 return None
             raise
-        return StoredObject(found["ContentLength"], found["ETag"])
 
     def read(self, key: str, most: int) -> bytes | None:
         """Returns a small object; None if there is none, or it has more bytes than `most`."""
@@ -268,6 +269,9 @@ def _problems() -> Iterator[None]:
     except (BotoCoreError, HTTPClientError, OSError) as error:
         text = f"the store does not answer ({type(error).__name__})"
         raise StoreError(StoreProblem.REFUSED, text) from error
+    except (ResponseParserError, KeyError, ValueError) as error:
+        # A page of a proxy in its place, for example.
+        raise StoreError(StoreProblem.REFUSED, "the store's answer makes no sense") from error
 
 
 def _if(call: Callable[..., Any], condition: dict[str, str], **request: Any) -> None:
