@@ -28,10 +28,11 @@ from common.tasks import cancel
 from fleet import consuming
 from fleet.consuming import Delivery, Start
 from fleet.errors import HubError, HubReason, RefusedError, UnreachableError, api_error, is_repeat
+from fleet.incoming import OPERATION
 from fleet.serving import Handler, Service, serve_in
-from fleet.session import NO_RESPONDERS, Message, Session, parsed
+from fleet.session import NO_RESPONDERS, Message, NotTaken, Session, parsed
 
-__all__ = ["Delivery", "Entry", "FleetAddress", "Hub", "Link", "Published", "Start", "connect"]
+__all__ = ["Delivery", "Entry", "FleetAddress", "Hub", "Link", "NotTaken", "Published", "Start", "connect"]
 
 FIRST_PAUSE_S: Final = 1.0
 LONGEST_PAUSE_S: Final = 60.0
@@ -122,6 +123,8 @@ class Hub:
         self._link = Link(False, "", None, "", asyncio.get_running_loop().time(), 0)
         self.changed = Broadcast()
         """Notified after each change of `link`."""
+        self.not_taken = NotTaken()
+        """Over all connections."""
 
     @property
     def link(self) -> Link:
@@ -170,7 +173,7 @@ class Hub:
         Raises:
             HubError: it is not certain that it is deleted.
         """
-        headers = {"KV-Operation": "DEL"}
+        headers = {OPERATION: "DEL"}
         acknowledged(await self._open().request(f"$KV.{bucket}.{key}", b"", timeout_s, headers))
 
     async def entries(self, bucket: str, timeout_s: float = REQUEST_TIMEOUT_S) -> dict[str, Entry]:
@@ -367,6 +370,7 @@ class Hub:
                     ca=address.ca,
                     inbox=address.inbox,
                     name=address.name,
+                    not_taken=self.not_taken,
                 )
             except HubError as error:
                 # One that refuses says more than one that is silent.
@@ -446,6 +450,6 @@ def _entry(bucket: str, delivery: Delivery) -> Entry:
         value=delivery.payload,
         revision=delivery.sequence,
         unix_s=delivery.unix_s,
-        deleted=delivery.headers.get("KV-Operation") in {"DEL", "PURGE"},
+        deleted=delivery.headers.get(OPERATION) in {"DEL", "PURGE"},
         pending=delivery.pending,
     )

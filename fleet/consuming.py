@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from common.backoff import Backoff
 from fleet.errors import HubError, HubReason
+from fleet.incoming import DESCRIPTION
 from fleet.session import NO_RESPONDERS, Message, Session, Waiter
 
 _PULL_EXPIRES_S: Final = 20.0
@@ -26,6 +27,10 @@ _MAX_BYTES: Final = 4 * 1024 * 1024
 _TIMEOUT_S: Final = 5.0
 _FIRST_PAUSE_S: Final = 0.05
 _LONGEST_PAUSE_S: Final = 0.5
+_ACKNOWLEDGED_BY: Final = "$JS.ACK."
+"""Beginning of the reply subjects that the hub gives to messages of a stream, and nothing else (ADR-15)."""
+_SOON_S: Final = 1.0
+"""A request without a message lasts longer, at an honest hub: until it expires."""
 _KNOWN_WITHIN_S: Final = 3.0
 """From a pull request that no node could pass on until the consumer counts as unknown."""
 _NANOSECONDS: Final = 1_000_000_000
@@ -109,11 +114,19 @@ async def pull(session: Session, stream: str, consumer: str, batch: int) -> Asyn
     Raises:
         HubError: it is lost, or the consumer is.
     """
+    backoff = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S)
     async with _Puller.open(session, stream, consumer) as puller:
         while True:
+            begin_s, empty = time.monotonic(), True
             async with aclosing(puller.request(batch, _PULL_EXPIRES_S)) as deliveries:
                 async for delivery in deliveries:
+                    empty = False
                     yield delivery
+            if empty and time.monotonic() - begin_s < _SOON_S:
+                # A hub that ends every request at once would keep this loop and the network busy.
+                await asyncio.sleep(backoff.next_s())
+            else:
+                backoff.reset()
 
 
 async def follow(
@@ -238,24 +251,30 @@ class _Puller:
             "expires": int(expires_s * _NANOSECONDS),
             "idle_heartbeat": int(heartbeat_s * _NANOSECONDS),
         }
-        backoff, known_by_s = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S), time.monotonic() + _KNOWN_WITHIN_S
+        backoff, begin_s = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S), time.monotonic()
         reply = await self._send(request)
         received = 0
         while received < batch:
             message = await self._waiter.get(2 * heartbeat_s + _TIMEOUT_S / 2)
+            elapsed_s = time.monotonic() - begin_s
+            if message.reply.startswith(_ACKNOWLEDGED_BY):
+                # Of the stream: a status in its headers is its sender's, not the hub's.
+                self._known = True
+                received += 1
+                yield delivery(self._session, message)
+                continue
+            if elapsed_s > expires_s + _TIMEOUT_S and self._waiter.replies.empty():
+                return  # The hub goes on with what it should have ended.
             # A status of an earlier request, which was complete, may come late.
             if message.status and message.subject != reply:
                 continue
-            if message.status == NO_RESPONDERS and not self._known and time.monotonic() < known_by_s:
+            if message.status == NO_RESPONDERS and not self._known and elapsed_s < _KNOWN_WITHIN_S:
                 # A node that has just started, or been joined, may not have heard of a new consumer yet.
                 await asyncio.sleep(backoff.next_s())
                 reply = await self._send(request)
                 continue
             self._known = True
-            if not message.status:
-                received += 1
-                yield delivery(self._session, message)
-            elif self._is_end(message):
+            if self._is_end(message):
                 return
 
     async def _send(self, request: dict[str, int]) -> str:
@@ -271,10 +290,12 @@ class _Puller:
         Raises:
             HubError: it says that the consumer can't be read.
         """
-        description = message.headers.get("Description", "")
+        description = message.headers.get(DESCRIPTION, "")
         match message.status:
             case "100":
                 return False
+            case "":
+                raise HubError(HubReason.INVALID, "the hub answers a pull request with what is no status")
             case "404" | "408":
                 return True
             case "409" if "batch completed" in description.lower() or "maxbytes" in description.lower():
@@ -304,7 +325,9 @@ def delivery(session: Session, message: Message) -> Delivery:
     try:
         numbers = [int(part) for part in parts[first : first + 5]]
         deliveries, sequence, consumer_sequence, unix_ns, pending = numbers
-    except ValueError as error:
+        taken_s = unix_ns / _NANOSECONDS
+    # A number of more digits than a float has is an OverflowError.
+    except (ValueError, OverflowError) as error:
         raise HubError(HubReason.INVALID, "a delivery has no place in its stream") from error
     return Delivery(
         subject=message.subject,
@@ -313,7 +336,7 @@ def delivery(session: Session, message: Message) -> Delivery:
         sequence=sequence,
         consumer_sequence=consumer_sequence,
         deliveries=deliveries,
-        unix_s=unix_ns / _NANOSECONDS,
+        unix_s=taken_s,
         pending=pending,
         _session=session,
         _reply=message.reply,

@@ -27,17 +27,22 @@ class HubReason(Enum):
     """The hub does not understand the request, or contradicts it."""
 
 
+_LONGEST_TEXT: Final = 600
+"""Characters of a sentence, in a log and in the status of a robot."""
+
+
 class HubError(Exception):
     """The hub did not do what it was asked to.
 
     Args:
         reason: why, for programs.
-        text: what happened, for people.
+        text: what happened, for people. The words of the hub in it may be anything: they are cut, and what is
+            not printable becomes a blank.
         code: JetStream's error code (err_code); 0 where it gave none.
     """
 
     def __init__(self, reason: HubReason, text: str, code: int = 0) -> None:
-        super().__init__(text)
+        super().__init__(_plain(text))
         self.reason = reason
         self.code = code
 
@@ -54,6 +59,10 @@ class RefusedError(HubError):
 
     def __init__(self, text: str) -> None:
         super().__init__(HubReason.REFUSED, text)
+
+
+def _plain(text: str) -> str:
+    return "".join(letter if letter.isprintable() else " " for letter in text[:_LONGEST_TEXT])
 
 
 _STORE_FAILED: Final = 10077
@@ -91,7 +100,8 @@ def api_error(error: Any) -> HubError:
     code = error.get("err_code", 0)
     if not isinstance(code, int):
         code = 0
-    text = str(error.get("description", "no description"))[:200]
+    description = error.get("description")
+    text = description[:200] if isinstance(description, str) else "no description"
     reason = _REASONS.get(code)
     if reason is None and code == _STORE_FAILED and any(sentence in text for sentence in _FULL):
         reason = HubReason.FULL

@@ -1,8 +1,9 @@
 """One connection to one server of the hub: the only importer of the NATS library.
 
 It never reconnects and buffers nothing: when it is lost, everything that waits for it fails at once, and
-`fleet.connection` opens another one. What a hostile server may cost is bounded: the size of a message, of
-what waits to be read, and of the list of servers, to which it can add none.
+`fleet.connection` opens another one. What a hostile server may cost is bounded: the size of a message with
+its headers and subjects, of what waits to be read or sent, and of the list of servers, to which it can add
+none. What is not taken of its messages is counted.
 """
 
 import asyncio
@@ -20,11 +21,12 @@ from nats import errors as nats_errors
 from nats.aio.client import Client
 from nats.aio.msg import Msg
 from nats.aio.transport import TcpTransport
-from nats.protocol.parser import PERMISSIONS_ERR, Parser
+from nats.protocol.parser import AWAITING_CONTROL_LINE, PERMISSIONS_ERR, Parser
 
 from common.deadline import within
 from fleet.errors import HubError, HubReason, RefusedError, UnreachableError, api_error
 from fleet.identity import Credentials
+from fleet.incoming import STATUS, read_headers, read_reply, read_subject
 from fleet.names import LARGEST_MESSAGE
 
 CONNECT_TIMEOUT_S: Final = 5.0
@@ -34,6 +36,8 @@ _PINGS_WITHOUT_ANSWER: Final = 2
 """A connection without an answer for (2 + 1) x 4 s is lost: half-open TCP is found within 15 s."""
 _MAX_MESSAGE: Final = 4 * 1024 * 1024
 """Longest message that is read, in bytes; the hub's max_payload is 1 MiB."""
+_MAX_CONTROL_LINE: Final = 64 * 1024
+"""Longest line of the protocol, in bytes; the longest of an honest server is INFO, of some KiB."""
 _MAX_WAITING: Final = 8 * 1024 * 1024
 """Bytes that may wait in one subscription, or for one caller."""
 _MAX_WAITING_MESSAGES: Final = 4096
@@ -52,7 +56,26 @@ class Message:
     @property
     def status(self) -> str:
         """JetStream's status code of a message without content, as "404"; empty for an ordinary one."""
-        return self.headers.get("Status", "")
+        return self.headers.get(STATUS, "")
+
+    @property
+    def size(self) -> int:
+        """Bytes of the payload, and characters of what is kept besides it."""
+        headers = sum(len(name) + len(value) for name, value in self.headers.items())
+        return len(self.payload) + len(self.subject) + len(self.reply) + headers
+
+
+@dataclass(slots=True)
+class NotTaken:
+    """What was not taken of the messages that a hub has sent.
+
+    Attributes:
+        unreadable: headers, subjects and reply subjects that are no text or exceed their bounds.
+        dropped: messages beyond what may wait to be read.
+    """
+
+    unreadable: int = 0
+    dropped: int = 0
 
 
 class _BoundedParser(Parser):
@@ -66,7 +89,9 @@ class _BoundedParser(Parser):
             await super().parse(data)
         except Exception as error:
             raise nats_errors.ProtocolError from error
-        if len(self.buf) > _MAX_MESSAGE:
+        if max(len(self.buf), self.needed) > _MAX_MESSAGE:
+            raise nats_errors.ProtocolError
+        if self.state == AWAITING_CONTROL_LINE and len(self.buf) > _MAX_CONTROL_LINE:
             raise nats_errors.ProtocolError
 
 
@@ -102,6 +127,11 @@ class _Transport(TcpTransport):
         async with asyncio.timeout(connect_timeout):
             await self._writer().start_tls(ssl_context, server_hostname=host)
 
+    def abort(self) -> None:
+        """Closes the connection at once: a server that reads nothing would keep it open."""
+        if self._io_writer is not None:
+            self._io_writer.transport.abort()
+
     def _writer(self) -> asyncio.StreamWriter:
         if self._io_writer is None:
             raise ConnectionError("there is no connection")
@@ -114,16 +144,45 @@ class _Client(Client):
     def __init__(self) -> None:
         super().__init__()
         self._ps = _BoundedParser(self)
-        self._transport = _Transport()  # type: ignore[no-untyped-call]  # the library's
+        self._own_transport = _Transport()  # type: ignore[no-untyped-call]  # the library's
+        self._transport = self._own_transport
         self.farewell = ""
         """What the server said before it closed the connection; the library keeps the last error only."""
+        self.not_taken = NotTaken()
 
     async def _process_op_err(self, e: Exception) -> None:
         # What waits to be sent is lost with the connection. The library would try to send it when it closes,
         # fail at that, and end half-way: without a word, with its tasks and its socket left behind.
         self._pending.clear()
         self._pending_data_size = 0
+        self.abort()
         await super()._process_op_err(e)
+
+    def abort(self) -> None:
+        """Closes the connection without what waits to be sent."""
+        self._own_transport.abort()
+
+    async def _flush_pending(self, force_flush: bool = False) -> Any:
+        # A server that sends pings and reads none of their answers: the library would wait for a place in
+        # this queue for ever, and its own pings, which find a silent server, with it.
+        if self.is_connected and self._flush_queue is not None and self._flush_queue.full():
+            await self._process_op_err(nats_errors.StaleConnectionError())
+        return await super()._flush_pending(force_flush)
+
+    async def _process_headers(self, headers: bytes | None) -> dict[str, str] | None:
+        if not headers:
+            return None
+        found = read_headers(headers)
+        if found is None:
+            self.not_taken.unreadable += 1
+        return found
+
+    def _build_message(
+        self, sid: int, subject: bytes, reply: bytes, data: bytes, headers: dict[str, str] | None
+    ) -> Msg:
+        (to, subject_readable), (reply_to, reply_readable) = read_subject(subject), read_reply(reply)
+        self.not_taken.unreadable += (not subject_readable) + (not reply_readable)
+        return Msg(_client=self, subject=to, reply=reply_to, data=data, headers=headers, _sid=sid)
 
     async def _process_pong(self) -> None:
         # A flush that timed out has left its cancelled future behind, and the library would complete it.
@@ -160,22 +219,33 @@ class _Client(Client):
             raise UnreachableError("it does not speak as a NATS server does")
         if encrypted and not self.encrypted():
             raise UnreachableError("it does not offer TLS")
+        size: Any = self._max_payload  # As the server has it.
+        if not isinstance(size, int):
+            raise UnreachableError("its greeting names no size of messages")
 
 
 class Waiter:
     """Where the replies to one request arrive."""
 
-    def __init__(self, subject: str) -> None:
+    def __init__(self, subject: str, not_taken: NotTaken | None = None) -> None:
         self.subject = subject
         self.replies: asyncio.Queue[Message | HubError] = asyncio.Queue()
+        self._not_taken = not_taken or NotTaken()
         self._bytes = 0
 
     def take(self, message: Message) -> None:
         """Keeps a message until it is read; beyond the bounds it is dropped."""
-        size = self._bytes + len(message.payload)
+        size = self._bytes + message.size
         if self.replies.qsize() < _MAX_WAITING_MESSAGES and size <= _MAX_WAITING:
             self._bytes = size
             self.replies.put_nowait(message)
+        else:
+            self._not_taken.dropped += 1
+
+    def refuse(self, error: HubError) -> None:
+        """Has an error raised when all before it has been read; one is enough, and a server may send more."""
+        if self.replies.qsize() < _MAX_WAITING_MESSAGES:
+            self.replies.put_nowait(error)
 
     async def get(self, timeout_s: float) -> Message:
         """Returns the next one.
@@ -191,14 +261,14 @@ class Waiter:
             raise HubError(HubReason.TIMEOUT, text) from error
         if isinstance(reply, HubError):
             raise reply
-        self._bytes -= len(reply.payload)
+        self._bytes -= reply.size
         return reply
 
 
 class Session:
     """A connection that stands, until it is lost."""
 
-    def __init__(self, client: Client, server: str, inbox: str) -> None:
+    def __init__(self, client: _Client, server: str, inbox: str) -> None:
         self._client = client
         self.server = server
         self._inbox = inbox
@@ -209,20 +279,37 @@ class Session:
 
     @classmethod
     async def open(
-        cls, server: str, *, credentials: Path | None, ca: Path | None, inbox: str, name: str
+        cls,
+        server: str,
+        *,
+        credentials: Path | None,
+        ca: Path | None,
+        inbox: str,
+        name: str,
+        not_taken: NotTaken | None = None,
     ) -> "Session":
         """Connects to a server.
+
+        Args:
+            server: As "tls://host:4222".
+            credentials: A .creds file.
+            ca: Authority of the server's certificate.
+            inbox: Prefix of the subjects that answers come to.
+            name: Shown in the servers' lists of connections.
+            not_taken: Counts what is not taken of its messages.
 
         Raises:
             UnreachableError: it can't be reached, or is not who it has to be.
             RefusedError: it does not accept the credentials.
         """
         client = _Client()
+        client.not_taken = not_taken or client.not_taken
         errors: list[Exception] = []
         sessions: list[Session] = []
 
         async def on_error(error: Exception) -> None:
             errors[:] = [error]
+            client.not_taken.dropped += isinstance(error, nats_errors.SlowConsumerError)
             for session in sessions:
                 session.note(error)
 
@@ -323,7 +410,7 @@ class Session:
             raise self.lost.result()
         self._count += 1
         token = str(self._count)
-        self._waiters[token] = waiter = Waiter(subject)
+        self._waiters[token] = waiter = Waiter(subject, self._client.not_taken)
         try:
             yield waiter, f"{self._inbox}.{token}"
         finally:
@@ -377,7 +464,7 @@ class Session:
         # The library makes it lower case.
         for waiter in list(self._waiters.values()):
             if f'"{waiter.subject.lower()}"' in text:
-                waiter.replies.put_nowait(RefusedError(f"the credentials do not permit {waiter.subject}"))
+                waiter.refuse(RefusedError(f"the credentials do not permit {waiter.subject}"))
 
     def note_closed(self, error: Exception | None) -> None:
         """Takes the end of the connection."""
@@ -431,7 +518,8 @@ def parsed(payload: bytes) -> dict[str, Any]:
     """
     try:
         answer = json.loads(payload)
-    except ValueError as error:
+    # Deep nesting is a RecursionError.
+    except (ValueError, RecursionError) as error:
         raise HubError(HubReason.INVALID, "the hub's answer is no JSON") from error
     if not isinstance(answer, dict):
         raise HubError(HubReason.INVALID, "the hub's answer is no JSON object")
@@ -500,9 +588,9 @@ def _repeat_cancellation() -> None:
         raise asyncio.CancelledError
 
 
-async def _close(client: Client) -> None:
+async def _close(client: _Client) -> None:
     try:
         await within(CONNECT_TIMEOUT_S, client.close())
     except (TimeoutError, OSError, nats_errors.Error):
-        # It is gone in any case.
-        return
+        # The socket of a server that does not take what is left would stay open.
+        client.abort()

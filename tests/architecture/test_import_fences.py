@@ -93,7 +93,10 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
             (f"practice/{name}.py", (*HEAVY, *WIRE, "console", "asyncio", "time", "threading"))
             for name in ("network", "robot", "scene")
         ),
-        *((f"fleet/{name}.py", ("nats", "nkeys", "asyncio")) for name in ("names", "reading", "standing")),
+        *(
+            (f"fleet/{name}.py", ("nats", "nkeys", "asyncio"))
+            for name in ("incoming", "names", "reading", "standing")
+        ),
         ("bridge/", ("console.cli", "console.fleet", "console.monitor", "console.window", "console.viewer")),
         ("hub/exporter/", ("hub.receiver", "hub.administration", "boto3")),
         ("console/fleet/", (*HEAVY, "grpc", "nats", "nkeys", "typer", "rich", "console.cli")),

@@ -7,7 +7,7 @@ from fleet.session import Message, Waiter
 
 
 def _message(size: int) -> Message:
-    return Message("subject", b"x" * size, {}, "")
+    return Message("", b"x" * size, {}, "")
 
 
 async def test_bytes_are_bounded_and_freed() -> None:
