@@ -7,6 +7,7 @@
 | an expired one, or one whose age is in doubt | EXPIRED |
 | the same command once more | the first one's result is the only one |
 | more than four at once, or more than one in ten seconds for long | they wait in the hub, and expire there |
+| expired, refused and strange ones, more than two a second for long | they wait, and others behind them |
 | the bridge ends before the gateway has answered | FAILED at the next start; not handed over again |
 
 What is trusted: nothing but the hub's own clock for ages (`ages.py`), and nothing for the rest. The bridge

@@ -3,11 +3,12 @@
 import asyncio
 import logging
 import time
+from collections.abc import Callable
 from typing import Final
 
 from bridge.clock import synchronised_unix_s
 from bridge.commands.hub_time import HubTime, age_s, hub_time
-from bridge.commands.judgement import Denial, Request, Stray, judge
+from bridge.commands.judgement import Denial, Judgement, Request, Stray, judge
 from bridge.commands.pending_requests import Pending, PendingRequests
 from bridge.config import BridgeSettings
 from bridge.jittered_backoff import JitteredBackoff
@@ -21,7 +22,11 @@ _log = logging.getLogger(__name__)
 
 _BURST: Final = 4.0
 _PER_S: Final = 0.1
-"""A robot has no use for more."""
+"""Requests that are handed over. A robot has no use for more."""
+_BURST_OF_OTHERS: Final = 16.0
+_OTHERS_PER_S: Final = 2.0
+"""Those that are only answered, with a write to the disk: what has expired while the robot was away, hundreds
+perhaps, keeps the next command back for minutes instead of hours."""
 _LOOK_S: Final = 0.5
 _TIME_GOOD_S: Final = 3600.0
 """Quartz clocks differ by less than 0.4 s in that time."""
@@ -34,22 +39,24 @@ class CommandConsumer:
         settings: of the bridge; `commands.allowed` is not empty.
         hub: brings them.
         requests: where requests wait for the gateway.
-
-    Attributes:
-        strays: messages that were no command to this robot.
-        denied: commands that were refused or had expired.
+        clock: monotonic seconds.
     """
 
-    def __init__(self, settings: BridgeSettings, hub: Hub, requests: PendingRequests) -> None:
+    def __init__(
+        self,
+        settings: BridgeSettings,
+        hub: Hub,
+        requests: PendingRequests,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         self._robot = settings.hub.robot
         self._allowed = frozenset(settings.commands.allowed)
-        self._hub, self._requests = hub, requests
-        self._bucket = TokenBucket(_BURST, time.monotonic())
+        self._hub, self._requests, self._clock = hub, requests, clock
+        self._handed_over = TokenBucket(_BURST, clock())
+        self._others = TokenBucket(_BURST_OF_OTHERS, clock())
         self._time: HubTime | None = None
         self._time_of = 0
         self._waiting: set[asyncio.Task[None]] = set()
-        self.strays = 0
-        self.denied = 0
 
     async def run(self) -> None:
         """Takes commands; a failure of hub or disk is tried again for as long as it takes."""
@@ -59,7 +66,6 @@ class CommandConsumer:
                 try:
                     await self._requests.end_those_of_an_earlier_run()
                     async for delivery in self._hub.pull(COMMANDS, self._robot, batch=1):
-                        await self._have_room()
                         await self._take(delivery)
                         backoff.reset()
                 except (HubError, OutboxError) as error:
@@ -72,27 +78,41 @@ class CommandConsumer:
 
     async def _have_room(self) -> None:
         """Waits while as many requests are pending as may be, and for the rate limit."""
-        while self._requests.is_full or not self._bucket.take(
-            time.monotonic(), capacity=_BURST, refill_per_s=_PER_S
+        while self._requests.is_full or not self._handed_over.take(
+            self._clock(), capacity=_BURST, refill_per_s=_PER_S
         ):
             await self._requests.expire()
             await asyncio.sleep(_LOOK_S)
 
+    async def _have_time_for_another(self) -> None:
+        """Waits for the rate limit of those that are only answered."""
+        while not self._others.take(self._clock(), capacity=_BURST_OF_OTHERS, refill_per_s=_OTHERS_PER_S):
+            await self._requests.expire()
+            await asyncio.sleep(_LOOK_S)
+
     async def _take(self, delivery: Delivery) -> None:
-        age = age_s(delivery.unix_s, time.monotonic(), await self._hub_time(), synchronised_unix_s())
-        judgement = judge(
-            delivery.subject, delivery.payload, robot=self._robot, allowed=self._allowed, age_s=age
-        )
+        judgement = await self._judge(delivery)
+        if isinstance(judgement, Request):
+            if self._requests.has(judgement.command_id):
+                return  # It comes again until it is answered.
+            await self._have_room()
+            # It may have expired while it waited.
+            judgement = await self._judge(delivery)
+        else:
+            await self._have_time_for_another()
         match judgement:
             case Stray(why):
-                self.strays += 1
+                self._requests.strays += 1
                 _log.warning("a message of the hub is no command to this robot: %s", why)
                 await delivery.ack()
             case Denial():
-                self.denied += 1
                 await self._deny(judgement, delivery)
             case Request():
                 await self._hand_over(judgement, delivery)
+
+    async def _judge(self, delivery: Delivery) -> Judgement:
+        age = age_s(delivery.unix_s, self._clock(), await self._hub_time(), synchronised_unix_s())
+        return judge(delivery.subject, delivery.payload, robot=self._robot, allowed=self._allowed, age_s=age)
 
     async def _deny(self, denial: Denial, delivery: Delivery) -> None:
         # A command that waits for the gateway comes again after a while, and may have expired meanwhile.
@@ -102,8 +122,6 @@ class CommandConsumer:
             await delivery.ack()
 
     async def _hand_over(self, request: Request, delivery: Delivery) -> None:
-        if self._requests.has(request.command_id):
-            return
         pending = await self._requests.add(request)
         if pending is None:
             await delivery.ack()
@@ -128,7 +146,7 @@ class CommandConsumer:
 
     async def _hub_time(self) -> HubTime | None:
         """Returns the hub's time, asked for once in a connection and then every hour."""
-        connections, now_s = self._hub.link.connections, time.monotonic()
+        connections, now_s = self._hub.link.connections, self._clock()
         fresh = self._time is not None and now_s - self._time.asked_s < _TIME_GOOD_S
         if not fresh or connections != self._time_of:
             try:

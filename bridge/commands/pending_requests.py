@@ -52,6 +52,10 @@ class PendingRequests:
         self._changed = changed
         self._clock = clock
         self._pending: dict[str, Pending] = {}
+        self.strays = 0
+        """Messages that were no command to this robot."""
+        self.denied = 0
+        """Commands that were refused, or had expired, without being handed to the gateway."""
 
     @property
     def pending(self) -> tuple[Pending, ...]:
@@ -89,6 +93,7 @@ class PendingRequests:
             OutboxError: it is not answered.
         """
         await self._keep(denial.command_id, denial.outcome, denial.message)
+        self.denied += 1
 
     async def answer(
         self, command_id: str, outcome: pb.CommandOutcome.ValueType, message: str, recording_id: str = ""
