@@ -83,7 +83,7 @@ async def serve(settings: BridgeSettings, stop: asyncio.Event) -> None:
         if settings.commands.allowed:
             parts.append(CommandConsumer(settings, hub, requests).run)
         server = rpc.new_server()
-        BridgeServicer(run_id, status, uploads, requests).register(server)
+        BridgeServicer(run_id, status, uploads, requests, hub.not_taken).register(server)
         Health(SERVICE).register(server)
         bind.bind_unix(server, settings.socket)
         await server.start()

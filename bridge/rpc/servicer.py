@@ -13,6 +13,7 @@ from bridge.uploading import Uploading
 from bridge.values import OutboxError
 from common.errors import InvalidRequestError, TooMuchError
 from common.reasons import Reason
+from fleet.connection import NotTaken
 from omniseer.bridge.v1 import bridge_service_pb2 as pb
 from omniseer.bridge.v1 import bridge_service_pb2_grpc as pb_grpc
 from omniseer.fleet.v1 import command_pb2
@@ -35,13 +36,22 @@ class BridgeServicer(pb_grpc.BridgeServiceServicer):
         status: of the connection.
         uploads: the queue.
         requests: requests of the hub.
+        not_taken: counts what the connection to the hub has not taken.
     """
 
-    def __init__(self, run_id: str, status: Status, uploads: Uploading, requests: PendingRequests) -> None:
+    def __init__(
+        self,
+        run_id: str,
+        status: Status,
+        uploads: Uploading,
+        requests: PendingRequests,
+        not_taken: NotTaken,
+    ) -> None:
         self._run_id = run_id
         self._status = status
         self._uploads = uploads
         self._requests = requests
+        self._not_taken = not_taken
 
     def register(self, server: grpc.aio.Server) -> None:
         """Adds the methods to a server."""
@@ -85,6 +95,12 @@ class BridgeServicer(pb_grpc.BridgeServiceServicer):
             status=self._status.message(),
             copies=self._uploads.copies(),
             requests=[_request(each) for each in self._requests.pending],
+            not_taken=pb.NotTaken(
+                unreadable=self._not_taken.unreadable,
+                dropped=self._not_taken.dropped,
+                strays=self._requests.strays,
+                denied=self._requests.denied,
+            ),
         )
 
 

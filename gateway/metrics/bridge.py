@@ -1,7 +1,7 @@
 """Metrics of the connection to the fleet."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from prometheus_client.core import Metric
 
@@ -9,7 +9,7 @@ from gateway.links.bridge.copies import Copies
 from gateway.links.bridge.link import BridgeLink
 from gateway.metrics.families import counter, counters, gauge, gauges
 from gateway.rpc.hub_requests import HubRequests
-from gateway.status.cloud import CloudState, CloudView
+from gateway.status.cloud import CloudState, CloudView, NotTaken
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +49,9 @@ def of_cloud(view: CloudView, now_s: float, bridge: BridgeMetrics) -> Iterator[M
     yield counter("cloud_events_sent", "Events that the hub has acknowledged.", status.events_sent)
     dropped = "Events dropped because the outbox was full or its disk refused."
     yield counter("cloud_events_dropped", dropped, status.events_dropped)
+    not_taken = {field.name: float(getattr(view.newest.not_taken, field.name)) for field in fields(NotTaken)}
+    refused = "What the bridge has not taken of all that the hub has sent, by why."
+    yield counters("hub_messages_not_taken", refused, "why", not_taken)
     if status.last_sent_age_ms is not None:
         age_s = status.last_sent_age_ms / 1000
         yield gauge("cloud_last_sent_age_seconds", "Age of the newest acknowledgement.", age_s)

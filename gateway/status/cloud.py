@@ -114,18 +114,30 @@ class CloudStatus:
 
 
 @dataclass(frozen=True, slots=True)
+class NotTaken:
+    """What the bridge has not taken of all that the hub has sent; see NotTaken in bridge_service.proto."""
+
+    unreadable: int = 0
+    dropped: int = 0
+    strays: int = 0
+    denied: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class BridgeReport:
     """The state of the bridge at one instant; see bridge_service.proto.
 
     Attributes:
         copies: some of those that the recorder is to know; each recording once, others in other reports.
         requests: of the hub, the oldest first.
+        not_taken: counts over the present run of the bridge.
     """
 
     instance_id: str
     status: CloudStatus
     copies: tuple[CopyReport, ...] = ()
     requests: tuple[HubRequest, ...] = ()
+    not_taken: NotTaken = NotTaken()
 
 
 OUTBOX_FULL: Final = 0.9

@@ -24,6 +24,7 @@ from gateway.status.cloud import (
     CopyReport,
     HubAction,
     HubRequest,
+    NotTaken,
     RecordingCopy,
     RecordingCopyState,
 )
@@ -140,6 +141,7 @@ def report_from(message: pb.WatchStateResponse, now_s: float) -> BridgeReport:
         _status(message.status, state),
         tuple(copies.values()),
         tuple(requests.values()),
+        same_fields(NotTaken, message.not_taken),
     )
 
 

@@ -76,6 +76,7 @@ class WatchStateResponse(_message.Message):
     STATUS_FIELD_NUMBER: _builtins.int
     COPIES_FIELD_NUMBER: _builtins.int
     REQUESTS_FIELD_NUMBER: _builtins.int
+    NOT_TAKEN_FIELD_NUMBER: _builtins.int
     instance_id: _builtins.str
     """Random for every process."""
     @_builtins.property
@@ -96,6 +97,10 @@ class WatchStateResponse(_message.Message):
         configuration allows requests.
         """
 
+    @_builtins.property
+    def not_taken(self) -> Global___NotTaken:
+        """What was not taken of all that the hub has sent since the bridge started."""
+
     def __init__(
         self,
         *,
@@ -103,14 +108,49 @@ class WatchStateResponse(_message.Message):
         status: _cloud_pb2.CloudStatus | None = ...,
         copies: _abc.Iterable[Global___CopyReport] | None = ...,
         requests: _abc.Iterable[Global___HubRequest] | None = ...,
+        not_taken: Global___NotTaken | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["status", b"status"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["not_taken", b"not_taken", "status", b"status"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["copies", b"copies", "instance_id", b"instance_id", "requests", b"requests", "status", b"status"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["copies", b"copies", "instance_id", b"instance_id", "not_taken", b"not_taken", "requests", b"requests", "status", b"status"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___WatchStateResponse: _TypeAlias = WatchStateResponse  # noqa: Y015
+
+@_typing.final
+class NotTaken(_message.Message):
+    """Messages of the hub, or parts of them, that exceed a bound or make no sense."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    UNREADABLE_FIELD_NUMBER: _builtins.int
+    DROPPED_FIELD_NUMBER: _builtins.int
+    STRAYS_FIELD_NUMBER: _builtins.int
+    DENIED_FIELD_NUMBER: _builtins.int
+    unreadable: _builtins.int
+    """Headers, subjects and reply subjects that are no text or too large. The message counted as one without them."""
+    dropped: _builtins.int
+    """Messages beyond what may wait to be read."""
+    strays: _builtins.int
+    """Messages of the stream of commands that were none to this robot."""
+    denied: _builtins.int
+    """Commands that were refused, or had expired, without being handed to the gateway."""
+    def __init__(
+        self,
+        *,
+        unreadable: _builtins.int = ...,
+        dropped: _builtins.int = ...,
+        strays: _builtins.int = ...,
+        denied: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["denied", b"denied", "dropped", b"dropped", "strays", b"strays", "unreadable", b"unreadable"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___NotTaken: _TypeAlias = NotTaken  # noqa: Y015
 
 @_typing.final
 class CopyReport(_message.Message):
