@@ -9,7 +9,9 @@ from common.config import Section
 from fleet.servers import THIS_MACHINE
 
 _TIME: Final = r"([01][0-9]|2[0-3]):[0-5][0-9]"
-_HOST: Final = r"^[a-z0-9]([a-z0-9.-]{0,251}[a-z0-9])?(:[0-9]{1,5})?$"
+_PLACE: Final = (
+    r"^[a-z0-9]([a-z0-9.-]{0,251}[a-z0-9])?(:[0-9]{1,5})?(/[A-Za-z0-9_-][A-Za-z0-9._-]{0,62}){0,4}$"
+)
 _MOST: Final = 16
 
 
@@ -29,19 +31,32 @@ class UploadSettings(Section):
     )
     """When, "22:00-06:00" for example, by the local time of the robot's computer. Empty: at all times."""
     only_while_charging: bool = False
-    store_hosts: tuple[Annotated[str, Field(pattern=_HOST)], ...] = Field(default=(), max_length=_MOST)
-    """HOST or HOST:PORT of the fleet's store. Recordings are sent nowhere else, whatever
-    URL the hub returns. Empty: nothing can be uploaded."""
+    store_hosts: tuple[Annotated[str, Field(pattern=_PLACE)], ...] = Field(default=(), max_length=_MOST)
+    """HOST or HOST:PORT of the fleet's store, with /BUCKET where others have buckets there. Recordings are
+    sent nowhere else, whatever URL the hub returns. Empty: nothing can be uploaded."""
     ca: Path | None = None
     """Certificate authority of the store. None: those of the system."""
     insecure_store: bool = False
     """Accepts a store without TLS on this machine, for tests."""
 
+    @property
+    def hosts(self) -> tuple[str, ...]:
+        """HOST or HOST:PORT of each place where recordings may be sent."""
+        return tuple(place.partition("/")[0] for place in self.store_hosts)
+
+    def permits(self, host: str, path: str) -> bool:
+        """Returns whether recordings may be sent there; the path is absolute, and leads nowhere but down."""
+        for place in self.store_hosts:
+            its_host, _, bucket = place.partition("/")
+            if host == its_host and (not bucket or path.startswith(f"/{bucket}/")):
+                return True
+        return False
+
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
         if 0 < self.max_bytes_per_s < 65_536:
             raise ValueError("max_bytes_per_s must be 0 or at least 65536")
-        names = {host.partition(":")[0] for host in self.store_hosts}
+        names = {host.partition(":")[0] for host in self.hosts}
         if self.insecure_store and not names <= THIS_MACHINE:
             raise ValueError("insecure_store is for stores on 127.0.0.1 alone")
         return self

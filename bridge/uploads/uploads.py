@@ -402,7 +402,7 @@ class Uploads:
     async def _interface(self) -> str:
         """Returns the interface to the host that is sent to; while none is, an allowed one to any of them."""
         sending = self._sender.host if self._sender and self._running else ""
-        found = [await interface_to(host) for host in ([sending] if sending else self._settings.store_hosts)]
+        found = [await interface_to(host) for host in ([sending] if sending else self._settings.hosts)]
         return next((name for name in found if not gates.wrong_interface(self._settings, name)), found[0])
 
     async def _look_up(self, recording_id: str) -> results.Recording:

@@ -55,6 +55,7 @@ def test_what_is_not_known_closes_a_gate() -> None:
         {"interfaces": ("eth0; rm",)},
         {"max_bytes_per_s": 100},
         {"store_hosts": ("https://store",)},
+        {"store_hosts": ("store.example/../bucket",)},
         {"store_hosts": ("store.example",), "insecure_store": True},
     ],
 )

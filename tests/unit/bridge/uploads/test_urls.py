@@ -53,6 +53,32 @@ def test_anything_else_is_refused(url: str) -> None:
         checked_url(url, SETTINGS)
 
 
+@pytest.mark.parametrize(
+    ("path", "accepted"),
+    [
+        ("/lab-recordings/lab/r1/one/data%20a.bin?uploadId=x", True),
+        ("/lab-recordings/..a/key", True),
+        ("/other/key", False),
+        ("/lab-recordings-evil/key", False),
+        ("/lab-recordings", False),
+        ("//lab-recordings/key", False),
+        ("/lab-recordings/../other/key", False),
+        ("/lab-recordings/./key", False),
+        ("/lab-recordings/%2e%2E/other/key", False),
+        ("/lab-recordings/%2e%2e%5cother/key", False),
+        ("/lab-recordings/a%2F..%2F..%2Fother/key", False),
+    ],
+)
+def test_where_others_have_buckets_only_the_named_one_is_sent_to(path: str, *, accepted: bool) -> None:
+    settings = UploadSettings(store_hosts=("s3.example/lab-recordings",))
+    assert settings.hosts == ("s3.example",)
+    if accepted:
+        assert checked_url(f"https://s3.example{path}", settings)
+    else:
+        with pytest.raises(CutError, match="nothing was sent"):
+            checked_url(f"https://s3.example{path}", settings)
+
+
 def test_without_tls_only_this_machine_and_only_where_configured() -> None:
     assert checked_url("http://127.0.0.1:9000/key", LOOPBACK)
     with pytest.raises(CutError):
