@@ -1,8 +1,8 @@
 """The commands of a driver's session: hold to run, and no way to forget the stop. Pure.
 
-A command says until when it is valid on the robot's clock: the newest instant that the robot has sent, plus
-the time since it arrived, plus 250 ms. So a command that was held up on its way moves nothing, whatever the
-two clocks show.
+A command says until when it is valid, 250 ms from now on the robot's clock, of which the driver's program has
+a bound that is never ahead of it (console.client.robot_clock). So a command that was held up on its way
+moves nothing, whatever the two clocks show.
 """
 
 import math
@@ -10,12 +10,13 @@ from dataclasses import dataclass
 from typing import Final
 
 from console.client.mapping.driving import DriveCommand
+from console.client.robot_clock import RobotClock
 
 HOLD_COUNTS_S: Final = 0.1
 """A hold that is not renewed for this long is a release: the program that reads the driver's hands hangs.
 When it goes on, its driver has to release and to hold again: no recovery of a program moves the robot."""
 VALID_S: Final = 0.25
-"""Longest validity of a command after the echoed instant has arrived."""
+"""Longest validity of a command after it was made."""
 _NS_PER_S: Final = 1_000_000_000
 
 
@@ -36,23 +37,6 @@ class Hold:
     wz_rad_s: float
     input_device: str
     at_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class Echo:
-    """The newest instant of the robot.
-
-    Attributes:
-        monotonic_ns: On the robot's clock; 0 before the first.
-        at_s: When it arrived, on the monotonic clock here.
-    """
-
-    monotonic_ns: int = 0
-    at_s: float = 0.0
-
-    def age_s(self, now_s: float) -> float:
-        """Returns the time since it arrived; infinite before the first."""
-        return now_s - self.at_s if self.monotonic_ns else math.inf
 
 
 class Commands:
@@ -113,12 +97,12 @@ class Commands:
         """Ends a hold without the driver: the session ends."""
         self._hold = None
 
-    def make(self, now_s: float, echo: Echo, picture_ns: int) -> DriveCommand:
+    def make(self, now_s: float, robot_clock: RobotClock, picture_ns: int) -> DriveCommand:
         """Returns the next command.
 
         Args:
             now_s: On the monotonic clock.
-            echo: It is valid for VALID_S after that.
+            robot_clock: Its newest instant is echoed.
             picture_ns: When the picture that the driver sees was captured, on the robot's clock; 0: none.
         """
         hold = self._hold
@@ -137,9 +121,9 @@ class Commands:
             vx_mps=hold.vx_mps if hold else 0.0,
             vy_mps=hold.vy_mps if hold else 0.0,
             wz_rad_s=hold.wz_rad_s if hold else 0.0,
-            echo_monotonic_ns=echo.monotonic_ns,
+            echo_monotonic_ns=robot_clock.newest_ns,
             picture_monotonic_ns=picture_ns,
-            valid_until_monotonic_ns=echo.monotonic_ns + int((now_s - echo.at_s + VALID_S) * _NS_PER_S),
+            valid_until_monotonic_ns=robot_clock.at_ns(now_s) + int(VALID_S * _NS_PER_S),
             input_device=hold.input_device if hold else self._input_device,
         )
 

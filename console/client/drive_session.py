@@ -13,12 +13,13 @@ from typing import Final, Self
 from common.broadcast import Broadcast
 from common.tasks import cancel
 from common.version import project_version
-from console.client.drive_commands import Commands, Echo, Hold
+from console.client.drive_commands import Commands, Hold
 from console.client.drive_lanes import Lanes, LaneTransport, Opening, Outgoing
 from console.client.drive_reasons import rest_reasons
 from console.client.errors import GatewayError, Refused
 from console.client.mapping.driving import command_request
 from console.client.results import DriveLimits, DriveOpened, DrivePhase, DriveState, Supervision
+from console.client.robot_clock import RobotClock
 
 COMMANDS_PER_S: Final = 50
 _FAREWELL_S: Final = 0.3
@@ -119,7 +120,7 @@ class DriveSession:
     @property
     def state_age_s(self) -> float:
         """Time since the newest state has arrived; infinite before the first."""
-        return self._robot.echo.age_s(time.monotonic())
+        return self._robot.clock.age_s(time.monotonic())
 
     @property
     def lapsed(self) -> bool:
@@ -228,12 +229,12 @@ class DriveSession:
 
     def _send_now(self) -> None:
         # Without an instant of the robot a command would be valid at no time.
-        if not self._ending and self._robot.echo.monotonic_ns:
+        if not self._ending and self._robot.clock.newest_ns:
             self._lanes.send(self._next_command())
 
     def _next_command(self, *, last: bool = False) -> Outgoing:
         picture_ns = self._options.picture() if self._options.picture else None
-        command = self._commands.make(time.monotonic(), self._robot.echo, picture_ns or 0)
+        command = self._commands.make(time.monotonic(), self._robot.clock, picture_ns or 0)
         return Outgoing(command.sequence, command.held, command_request(command), last)
 
     async def _close(self) -> None:
@@ -254,7 +255,7 @@ class _Robot:
         self._changes = changes
         self._armed_at = 0
         """The newest command when the robot said that it was armed."""
-        self.echo = Echo()
+        self.clock = RobotClock()
         self.limits: DriveLimits | None = None
         self.state: DriveState | None = None
         self.error: GatewayError | None = None
@@ -274,9 +275,9 @@ class _Robot:
 
     def received(self, state: DriveState) -> None:
         """Takes a state, unless another lane was faster."""
-        if state.monotonic_ns <= self.echo.monotonic_ns:
+        if state.monotonic_ns <= self.clock.newest_ns:
             return
-        self.echo = Echo(state.monotonic_ns, time.monotonic())
+        self.clock.note(state.monotonic_ns, time.monotonic())
         if self.state is None or self.state.phase is not DrivePhase.ARMED:
             self._armed_at = self._commands.sequence
         self.state = state

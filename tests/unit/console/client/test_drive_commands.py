@@ -4,10 +4,18 @@ import random
 
 import pytest
 
-from console.client.drive_commands import HOLD_COUNTS_S, VALID_S, Commands, Echo, Hold
+from console.client.drive_commands import HOLD_COUNTS_S, VALID_S, Commands, Hold
+from console.client.robot_clock import RobotClock
 
 STEP_S = 0.02
-ECHO = Echo(monotonic_ns=5_000_000_000, at_s=100.0)
+ROBOT_NS = 5_000_000_000
+ARRIVED_S = 100.0
+
+
+def robot_clock() -> RobotClock:
+    clock = RobotClock()
+    clock.note(ROBOT_NS, ARRIVED_S)
+    return clock
 
 
 class Driver:
@@ -15,7 +23,8 @@ class Driver:
 
     def __init__(self) -> None:
         self.commands = Commands("program")
-        self.now_s = 100.0
+        self.now_s = ARRIVED_S
+        self.robot_clock = robot_clock()
         self.stuck = False
 
     def hold(self, vx_mps: float = 0.2, *, after_s: float = 0.0) -> None:
@@ -24,7 +33,7 @@ class Driver:
 
     def next_holds(self, *, after_s: float = STEP_S) -> bool:
         self.now_s += after_s
-        command = self.commands.make(self.now_s, ECHO, 0)
+        command = self.commands.make(self.now_s, self.robot_clock, 0)
         if not self.stuck:
             self.commands.left(held=command.held)
         return command.held
@@ -35,17 +44,17 @@ def driver() -> Driver:
     return Driver()
 
 
-def test_a_command_is_valid_for_250_ms_after_the_robots_instant_has_arrived() -> None:
-    late = Commands("program").make(ECHO.at_s + 0.125, ECHO, 7)
-    assert late.echo_monotonic_ns == ECHO.monotonic_ns
-    assert late.valid_until_monotonic_ns == ECHO.monotonic_ns + int((0.125 + VALID_S) * 1e9)
+def test_a_command_is_valid_for_250_ms_on_the_robots_clock() -> None:
+    late = Commands("program").make(ARRIVED_S + 0.125, robot_clock(), 7)
+    assert late.echo_monotonic_ns == ROBOT_NS
+    assert late.valid_until_monotonic_ns == ROBOT_NS + int((0.125 + VALID_S) * 1e9)
     assert late.picture_monotonic_ns == 7
 
 
 def test_the_device_is_the_holds_own_and_that_of_the_session_without_one(driver: Driver) -> None:
-    assert driver.commands.make(driver.now_s, ECHO, 0).input_device == "program"
+    assert driver.commands.make(driver.now_s, driver.robot_clock, 0).input_device == "program"
     driver.hold()
-    assert driver.commands.make(driver.now_s, ECHO, 0).input_device == "gamepad"
+    assert driver.commands.make(driver.now_s, driver.robot_clock, 0).input_device == "gamepad"
 
 
 def test_a_hold_counts_for_100_ms(driver: Driver) -> None:
@@ -96,7 +105,7 @@ def test_what_is_no_velocity_is_refused_and_the_hold_before_it_stays(driver: Dri
     driver.hold()
     with pytest.raises(ValueError, match="finite"):
         driver.hold(number)
-    command = driver.commands.make(driver.now_s, ECHO, 0)
+    command = driver.commands.make(driver.now_s, driver.robot_clock, 0)
     assert command.held
     assert command.vx_mps == 0.2
 

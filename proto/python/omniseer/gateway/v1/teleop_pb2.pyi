@@ -241,8 +241,9 @@ class DriveCommand(_message.Message):
     StreamEndpoint.capture_offset_ns). 0 without a picture.
     """
     valid_until_monotonic_ns: _builtins.int
-    """No motion by this command afterwards, on the same clock, in ns: echo_monotonic_ns, plus the time since its
-    arrival, plus at most 250 ms. Early by the way of the echo, never late, and independent of the driver's clock.
+    """No motion by this command afterwards, on the same clock, in ns: any DriveState.monotonic_ns of the last second,
+    plus the time since its arrival, plus at most 250 ms. Early by the way of that state, never late, and independent
+    of the driver's clock. The state with the shortest way serves best: the one with the latest of these instants.
     """
     input_device: _builtins.str
     """What the driver steers with, for the audit log: "keyboard", "gamepad". At most 32 characters."""
