@@ -10,7 +10,7 @@ from typing import Final, Protocol, TypeAlias
 from common.backoff import Backoff
 from common.broadcast import Broadcast
 from common.tasks import cancel
-from console.client.errors import GatewayError, GatewayFailed, Refused, Unreachable
+from console.client.errors import GatewayError, GatewayFailed, Overloaded, Refused, Unreachable
 from console.client.mapping.driving import join_request, open_request
 from console.client.mapping.methods import DRIVE, Method
 from console.client.results import DriveOpened, DriveState, Supervision
@@ -206,7 +206,9 @@ class Lanes:
                 # Where the gateway ends a call while a command is written, gRPC's asyncio client makes up an
                 # internal error. To join the session again has the gateway say why, if it is over.
                 made_up = isinstance(error, GatewayFailed) and backoff.failures < _REJOINS
-                if isinstance(error, Refused) or (self.open_count == 0 and not made_up):
+                # One that has no room for another lane, or takes this one for open still, keeps the session.
+                refused = isinstance(error, Refused) and not isinstance(error, Overloaded)
+                if refused or (self.open_count == 0 and not made_up):
                     self._lose(error)
                     return
             opened = None

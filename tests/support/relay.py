@@ -75,4 +75,5 @@ class Relay:
                     self.to_clients += len(data)
         except ConnectionError:
             pass
-        sink.transport.abort()
+        if not self.frozen:  # Otherwise the end is lost, too.
+            sink.transport.abort()

@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import AsyncIterator, Iterator
 from dataclasses import replace
+from itertools import chain, repeat
 from typing import Any
 
 import grpc
@@ -38,6 +39,7 @@ from omniseer.gateway.v1 import robot_gateway_pb2, teleop_pb2
 from omniseer.gateway.v1.teleop_pb2_grpc import TeleopServiceStub
 from tests.support.driven_robot import BY_EYE, DrivenRobot, held, in_motion, is_at_rest
 from tests.support.eventually import eventually
+from tests.support.relay import Relay
 from tests.support.running_gateway import raw_unary
 
 pytestmark = pytest.mark.ros
@@ -275,6 +277,30 @@ async def test_one_lane_may_go(robot: DrivenRobot, client: AsyncGatewayClient) -
             await asyncio.sleep(0.02)
         session.check()
         assert robot.base.moves
+
+
+async def test_a_lane_that_vanishes_comes_back_and_costs_no_session(
+    robot: DrivenRobot, client: AsyncGatewayClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """For some seconds the gateway takes the lane that the client has given up for open, and refuses another."""
+    async with Relay(robot.gateway.port) as relay:
+        session = client.drive(BY_EYE)
+        targets = chain([robot.target, f"127.0.0.1:{relay.port}"], repeat(robot.target))
+        monkeypatch.setattr(
+            session._lanes, "_connect", lambda: GrpcTransport(next(targets), ClientOptions(), Credentials())
+        )
+
+        async def open_lanes() -> int:
+            session.check()
+            return session.open_lanes
+
+        async with session:
+            assert session.open_lanes == LANES
+            relay.frozen = True
+            await eventually(open_lanes, lambda lanes: lanes == 1, "the client has noticed")
+            await in_motion(session, robot.base, SPEED_MPS)
+            session.release()
+            await eventually(open_lanes, lambda lanes: lanes == LANES, "and the gateway, some seconds later")
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from console.client.blocking import BlockingDriveSession
 from console.client.drive_commands import HOLD_COUNTS_S
 from console.client.drive_lanes import LANES, MAX_UNACKNOWLEDGED, LaneItem
 from console.client.drive_session import COMMANDS_PER_S, DriveOptions, DriveSession
-from console.client.errors import Refused, Unreachable
+from console.client.errors import Overloaded, Refused, Unreachable
 from console.client.loop_thread import LoopThread
 from console.client.mapping.methods import Method
 from console.client.results import DriveLimits, DriveOpened, DrivePhase, DriveState
@@ -51,6 +51,9 @@ class Robot:
     def __init__(self) -> None:
         self.answers = True
         self.ends_with: Refused | None = None
+        self.opens_with: Refused | None = None
+        self.refused = 0
+        self.lanes: list[PlayedLane] = []
         self.commands: list[teleop_pb2.DriveCommand] = []
         """Each once, in order: the first copy counts."""
         self.finished = 0
@@ -92,7 +95,7 @@ class Robot:
 
 class PlayedLane:
     def __init__(self, robot: Robot) -> None:
-        self._robot, self._opened = robot, False
+        self._robot, self._opened, self.lost = robot, False, False
         self._finished = asyncio.Event()
 
     async def write(self, request: bytes) -> None:
@@ -100,12 +103,15 @@ class PlayedLane:
 
     async def read(self) -> LaneItem:
         if not self._opened:
+            if self._robot.opens_with:
+                self._robot.refused += 1
+                raise self._robot.opens_with
             self._opened = True
             return DriveOpened(session_id="a session", run_id="a run", limits=LIMITS)
         while True:
             if self._robot.ends_with:
                 raise self._robot.ends_with
-            if self._finished.is_set():
+            if self._finished.is_set() or self.lost:
                 raise Unreachable("the lane has ended")
             await asyncio.sleep(1 / COMMANDS_PER_S)
             if self._robot.answers:
@@ -124,7 +130,9 @@ class PlayedTransport:
         self._robot = robot
 
     def open_both_ways(self, method: Method[LaneItem]) -> PlayedLane:  # noqa: ARG002  # there is one
-        return PlayedLane(self._robot)
+        lane = PlayedLane(self._robot)
+        self._robot.lanes.append(lane)
+        return lane
 
     async def close(self) -> None:
         pass
@@ -265,6 +273,20 @@ async def test_what_ends_the_session_ends_the_hold() -> None:
         assert not session._commands.held
         with pytest.raises(Refused, match="taken over"):
             session.check()
+
+
+async def test_a_lane_that_an_overloaded_robot_refuses_does_not_end_the_session() -> None:
+    """It has no room for another connection now, or takes the lane that was lost for open still."""
+    robot = Robot()
+    async with driving(robot) as session:
+        robot.opens_with = Overloaded("this session has two lanes")
+        robot.lanes[-1].lost = True
+        await until(lambda: robot.refused >= 2, "the lane is refused, and tried again")
+        holds = await more_commands(robot, 10, partial(session.hold, SPEED_MPS))
+        assert holds[-5:] == [True] * 5
+        assert (session.open_lanes, session.error) == (1, None)
+        robot.opens_with = None
+        await until(lambda: session.open_lanes == LANES, "there is room again")
 
 
 async def test_a_velocity_that_is_no_number_is_refused_and_holds_nothing() -> None:
