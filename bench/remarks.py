@@ -27,8 +27,8 @@ REMARKS: Final[Mapping[tuple[str, ...], str]] = {
         " leaves a status its time."
     ),
     ("drive.cpu",): (
-        "a bar on the value itself, on two slow cores. Driven, the program takes 100 commands a second, 50 on"
-        " each lane, and publishes 50."
+        "a bar on the value itself, on two slow cores. Driven, the program takes 50 commands a second (the"
+        " gateway drops the copies of the second lane), publishes 50, and sends its guard 50 heartbeats."
     ),
     ("drive.false_stops_very_lossy",): (
         "a packet that is lost, and whose repetition is lost as well, holds up a lane for longer than the"

@@ -1,6 +1,5 @@
 """The robot's base as the ROS 2 graph shows it, and the publisher of its velocities."""
 
-import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Final
@@ -13,16 +12,40 @@ from drive.other_sources import OtherSources
 from drive.outranking import Outranking
 from drive.stop_input import stop_inputs
 from drive.subscriptions import NEWEST, is_still, newest, subscribe, velocity_of
+from drive.takers import Takers
 from drive.values import MS, Surroundings, Velocity
-
-_log = logging.getLogger(__name__)
 
 _ODOMETRY_NS: Final = 500 * MS
 """Older odometry says nothing about now."""
-_LOOK_EVERY_NS: Final = 500 * MS
-"""At the graph: who subscribes."""
+_ODOMETRY_EVERY_NS: Final = 100 * MS
+"""It says when the robot has come to rest; to decode one takes longer than all other messages of a cycle."""
+_MUX_OUTPUT_EVERY_NS: Final = 40 * MS
+"""Another source is noticed after 300 ms (drive.outranking); every second velocity is enough for that."""
 _ACKNOWLEDGED_S: Final = 0.04
 """Within the guard's patience; on a robot an acknowledgement takes a millisecond."""
+
+
+class _Output:
+    """The publisher of one output. Its message is filled anew each time: to make one costs more than that."""
+
+    def __init__(self, node: Any, output: Output) -> None:
+        message_type = message_class(output.type)
+        self._message = message_type()
+        self.publisher = node.create_publisher(message_type, output.topic, NEWEST)
+        self._header = self._message.header if output.type.endswith("Stamped") else None
+        self._twist = self._message.twist if self._header else self._message
+        if self._header:
+            self._header.frame_id = output.frame_id
+
+    def publish(self, velocity: Velocity, stamp: Any) -> None:
+        """Publishes a velocity; the middleware has taken it when this returns."""
+        if self._header:
+            self._header.stamp = stamp
+        twist = self._twist
+        twist.linear.x = velocity.vx_mps
+        twist.linear.y = velocity.vy_mps
+        twist.angular.z = velocity.wz_rad_s
+        self.publisher.publish(self._message)
 
 
 class VelocityPublisher:
@@ -36,30 +59,15 @@ class VelocityPublisher:
 
     def __init__(self, node: Any, outputs: Sequence[Output], lock_topic: str | None) -> None:
         self._clock = node.get_clock()
-        self._outputs = [
-            (
-                output,
-                message_class(output.type),
-                node.create_publisher(message_class(output.type), output.topic, NEWEST),
-            )
-            for output in outputs
-        ]
+        self._outputs = [_Output(node, output) for output in outputs]
         self._lock_type = message_class("std_msgs/msg/Bool")
         self._lock = node.create_publisher(self._lock_type, lock_topic, NEWEST) if lock_topic else None
 
     def publish(self, velocity: Velocity) -> None:
         """Publishes a velocity on all outputs, stamped now: some controllers reject by the stamp's age."""
-        for output, message_type, publisher in self._outputs:
-            message = message_type()
-            twist = message
-            if output.type.endswith("Stamped"):
-                message.header.stamp = self._clock.now().to_msg()
-                message.header.frame_id = output.frame_id
-                twist = message.twist
-            twist.linear.x = velocity.vx_mps
-            twist.linear.y = velocity.vy_mps
-            twist.angular.z = velocity.wz_rad_s
-            publisher.publish(message)
+        stamp = self._clock.now().to_msg()
+        for output in self._outputs:
+            output.publish(velocity, stamp)
 
     def lock(self, *, active: bool) -> None:
         """Locks or unlocks the multiplexer, where it can be."""
@@ -68,53 +76,12 @@ class VelocityPublisher:
 
     def matched(self) -> int:
         """Returns how many subscriptions take the velocities, observers included."""
-        return sum(publisher.get_subscription_count() for _, _, publisher in self._outputs)
+        return sum(output.publisher.get_subscription_count() for output in self._outputs)
 
     def wait_until_acknowledged(self) -> None:
         """Waits, for a moment, until reliable subscribers have the last velocity: before the process ends."""
-        for _, _, publisher in self._outputs:
-            publisher.wait_for_all_acked(Duration(seconds=_ACKNOWLEDGED_S))
-
-
-class _Takers:
-    """Whether anything but this project's own observers takes the velocities, on each leg of their way."""
-
-    def __init__(self, node: Any, velocities: VelocityPublisher, settings: DriveSettings) -> None:
-        self._node = node
-        self._velocities = velocities
-        self._outputs = [output.topic for output in settings.outputs]
-        self._mux_output = settings.mux_output.topic if settings.mux_output else None
-        self._counts: tuple[int, int] | None = None
-        self._observers = 0, 0
-        self._looked_ns = 0
-
-    def problems(self, now_ns: int) -> list[str]:
-        """Returns what is missing; looking closely only when a count has changed, and now and then."""
-        counts = self._velocities.matched(), self._count(self._mux_output)
-        if counts != self._counts or now_ns - self._looked_ns >= _LOOK_EVERY_NS:
-            self._counts, self._looked_ns = counts, now_ns
-            on_outputs = sum(self._observers_of(topic) for topic in self._outputs)
-            self._observers = on_outputs, self._observers_of(self._mux_output)
-        problems = []
-        if counts[0] <= self._observers[0]:
-            problems.append(f"nothing takes the velocities on {', '.join(self._outputs)}")
-        if self._mux_output and counts[1] <= self._observers[1]:
-            problems.append(f"no base takes the velocities on {self._mux_output}")
-        return problems
-
-    def _count(self, topic: str | None) -> int:
-        return int(self._node.count_subscribers(topic)) if topic else 0
-
-    def _observers_of(self, topic: str | None) -> int:
-        if topic is None:
-            return 0
-        try:
-            found = self._node.get_subscriptions_info_by_topic(topic)
-        except (RuntimeError, UnicodeError) as error:
-            # A program that announces a name that is no text; then all that is known is their number.
-            _log.debug("the subscribers of %s can't be listed: %s", topic, error)
-            return 0
-        return sum(each.node_name in OWN_NODES for each in found)
+        for output in self._outputs:
+            output.publisher.wait_for_all_acked(Duration(seconds=_ACKNOWLEDGED_S))
 
 
 class Base:
@@ -122,7 +89,13 @@ class Base:
 
     def __init__(self, node: Any, settings: DriveSettings) -> None:
         self._velocities = VelocityPublisher(node, settings.outputs, settings.lock_topic)
-        self._takers = _Takers(node, self._velocities, settings)
+        self._takers = Takers(
+            node,
+            self._velocities,
+            [output.topic for output in settings.outputs],
+            settings.mux_output.topic if settings.mux_output else None,
+            OWN_NODES,
+        )
         self._outranking = Outranking() if settings.mux_output else None
         self._mux_output = (
             subscribe(node, settings.mux_output.type, settings.mux_output.topic)
@@ -139,6 +112,7 @@ class Base:
         self._stops = stop_inputs(node, settings)
         self._problems: list[str] = []
         self._still: tuple[int, bool] | None = None
+        self._odometry_due_ns = self._mux_output_due_ns = 0
 
     def publish(self, velocity: Velocity, now_ns: int) -> None:
         """Publishes a velocity, and remembers it for the comparison with what reaches the base."""
@@ -150,6 +124,10 @@ class Base:
         """Locks or unlocks the multiplexer, where it can be."""
         self._velocities.lock(active=active)
 
+    def matched(self) -> int:
+        """Returns how many subscriptions take the velocities, observers included."""
+        return self._velocities.matched()
+
     def wait_until_acknowledged(self) -> None:
         """Waits, for a moment, until reliable subscribers have the last velocity."""
         self._velocities.wait_until_acknowledged()
@@ -160,10 +138,8 @@ class Base:
 
     def observed(self, now_ns: int) -> Surroundings:
         """Takes what has arrived; returns what it says. The preview's part is the gateway's to say."""
-        if self._outranking and (message := newest(self._mux_output)):
-            self._outranking.seen(velocity_of(message), now_ns)
-        if odometry := newest(self._odometry):
-            self._still = now_ns, is_still(velocity_of(odometry.twist))
+        self._take_mux_output(now_ns)
+        self._take_odometry(now_ns)
         self._problems = self._takers.problems(now_ns)
         fresh = self._still is not None and now_ns - self._still[0] <= _ODOMETRY_NS
         return Surroundings(
@@ -177,6 +153,20 @@ class Base:
             ),
             commanded_on=self._other_sources.commanding(now_ns),
         )
+
+    def _take_mux_output(self, now_ns: int) -> None:
+        if self._outranking is None or now_ns < self._mux_output_due_ns:
+            return
+        self._mux_output_due_ns = now_ns + _MUX_OUTPUT_EVERY_NS
+        if message := newest(self._mux_output):
+            self._outranking.seen(velocity_of(message), now_ns)
+
+    def _take_odometry(self, now_ns: int) -> None:
+        if now_ns < self._odometry_due_ns:
+            return
+        self._odometry_due_ns = now_ns + _ODOMETRY_EVERY_NS
+        if odometry := newest(self._odometry):
+            self._still = now_ns, is_still(velocity_of(odometry.twist))
 
 
 @contextmanager

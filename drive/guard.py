@@ -47,7 +47,7 @@ _EXIT_NS: Final = 500 * MS
 _LONGEST_WAIT_S: Final = 1.0
 """The guard's own heartbeats go out as often."""
 _MAX_BEAT_BYTES: Final = 16 * 1024
-_SEND_BUFFER_BYTES: Final = 8 * 1024
+_SEND_BUFFER_BYTES: Final = 7 * 1024
 """SO_SNDBUF, which the kernel doubles: room for the largest heartbeat, and for 0.4 s of usual ones at most,
 so that the worker soon notices a guard that reads none."""
 _FIRST_PAUSE_S: Final = 0.1

@@ -196,7 +196,8 @@ def step(state: State, event: Event, now_ns: int, rules: Rules) -> State:
     before = state
     state, trigger = _taken(before, event, now_ns, rules)
     reasons = inhibits(state.lease, state.command, state.surroundings, now_ns, rules.deadlines)
-    state = replace(state, inhibits=reasons)
+    if reasons != state.inhibits:
+        state = replace(state, inhibits=reasons)
     if trigger:
         state = _moved(state, trigger, now_ns)
     for condition in _conditions(before, state, now_ns):

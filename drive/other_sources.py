@@ -21,6 +21,8 @@ _MOST: Final = 16
 _LOOK_EVERY_NS: Final = 500 * MS
 _DISCOVERY_NS: Final = 3_000 * MS
 """Until the multiplexer, its inputs and what publishes on them are discovered, if there are any."""
+_TAKE_EVERY_NS: Final = 100 * MS
+"""Only a reset asks for it."""
 _COMMANDED_NS: Final = 1_000 * MS
 """A source that has commanded motion counts as one that does for so long: twice twist_mux's usual timeout."""
 
@@ -55,7 +57,8 @@ class OtherSources:
         self._outputs, self._ours = outputs, ours
         self._inputs: dict[str, _Input] = {}
         self._found: dict[str, str] = {}
-        self._looked_ns = 0
+        self._looked_ns = self._taken_ns = 0
+        self._commanding: tuple[str, ...] = ()
 
     def known(self, now_ns: int, foreign_motion_ns: int) -> bool:
         """Whether there has been time enough to discover them.
@@ -72,9 +75,12 @@ class OtherSources:
         if now_ns - self._looked_ns >= _LOOK_EVERY_NS:
             self._looked_ns = now_ns
             self._look()
-        self._follow(now_ns)
-        # All are asked, so that each takes what has arrived.
-        return tuple([topic for topic, each in self._inputs.items() if each.commands(now_ns)])
+        if now_ns - self._taken_ns >= _TAKE_EVERY_NS:
+            self._taken_ns = now_ns
+            self._follow(now_ns)
+            # All are asked, so that each takes what has arrived.
+            self._commanding = tuple([topic for topic, each in self._inputs.items() if each.commands(now_ns)])
+        return self._commanding
 
     def _look(self) -> None:
         try:

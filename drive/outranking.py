@@ -38,7 +38,9 @@ class Outranking:
 
     def seen(self, velocity: Velocity, now_ns: int) -> None:
         """Records a velocity that reached the base."""
-        if any(now_ns - at_ns <= _REMEMBERED_NS and _same(ours, velocity) for at_ns, ours in self._published):
+        # The newest first: it is nearly always that one.
+        published = reversed(self._published)
+        if any(now_ns - at_ns <= _REMEMBERED_NS and _same(ours, velocity) for at_ns, ours in published):
             self._ours_ns = now_ns
         elif not _same(velocity, ZERO):
             self.foreign_motion_ns = now_ns

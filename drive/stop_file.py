@@ -98,6 +98,8 @@ class StopFile:
 
     def keep(self, stops: Stops) -> None:
         """Queues the stops to be written, unless they are those that were written last."""
+        if stops == self._newest:
+            return  # The guard says so with each heartbeat; waking the thread would cost more than all else.
         with self._changed:
             self._newest = stops
             self._changed.notify()

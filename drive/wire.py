@@ -162,11 +162,28 @@ def actual_state(
     )
     if command:
         message.newest_sequence, message.command_ns = command.sequence, state.command_ns
+    _add_what_is_kept(message, state, episode)
+    return message
+
+
+def heartbeat(state: State, episode: Episode | None) -> pb.ActualState:
+    """Returns what the guard needs of the report of a state: it comes 50 times a second.
+
+    Args:
+        state: of the machine.
+        episode: the newest.
+    """
+    message = pb.ActualState(phase=PHASES[state.phase])
+    _add_what_is_kept(message, state, episode)
+    return message
+
+
+def _add_what_is_kept(message: pb.ActualState, state: State, episode: Episode | None) -> None:
+    """Adds what outlives the process: the stop, and the newest time of motion."""
     if state.latch:
         message.stop.CopyFrom(_latch_message(state.latch, state.since_ns))
     if episode:
         message.episode.CopyFrom(_episode_message(episode))
-    return message
 
 
 def _speed_limit_mps(state: State, rules: Rules, now_ns: int) -> float:

@@ -189,7 +189,6 @@ class Worker:
 
     def _cycle(self, now_ns: int) -> None:
         self._feed(Observe(self._surroundings(now_ns)), now_ns)
-        self._feed(Tick(), now_ns)
         # First: the guard must know that there may be motion before there is any.
         self._beat(now_ns)
         self._publish(now_ns)
@@ -252,7 +251,8 @@ class Worker:
 
     def _beat(self, now_ns: int) -> None:
         try:
-            self._heartbeats.send(self._actual(now_ns).SerializeToString(), socket.MSG_DONTWAIT)
+            beat = wire.heartbeat(self._state, self._episode)
+            self._heartbeats.send(beat.SerializeToString(), socket.MSG_DONTWAIT)
         except BlockingIOError:
             self._judge_guard(now_ns)
         except OSError:

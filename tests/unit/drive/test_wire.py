@@ -16,7 +16,9 @@ from drive.wire import (
     ProtocolError,
     actual_state,
     decoded,
+    episode_of,
     event_of,
+    heartbeat,
     welcome,
 )
 from omniseer.drive.v1 import drive_pb2 as pb
@@ -100,3 +102,12 @@ def test_the_welcome_has_the_limits_in_effect() -> None:
     assert not welcome("1", rules).welcome.HasField("base_timeout_ms")
     assert limits.max_picture_age_ms == 300
     assert limits.max_vx_mps == pytest.approx(rules.limits.vx_mps)
+
+
+def test_a_heartbeat_has_what_the_guard_keeps() -> None:
+    latch, episode = Latch(4, "ben", "a child"), Episode(3, "anna", 10, 20, 0.5, 0.25, "released")
+    beat = heartbeat(State(phase=Phase.STOPPED, latch=latch), episode)
+    assert beat.phase == PHASES[Phase.STOPPED]
+    assert (beat.stop.stop_id, beat.stop.by, beat.stop.reason) == (4, "ben", "a child")
+    assert episode_of(beat) == episode
+    assert not heartbeat(State(phase=Phase.ARMED), None).HasField("stop")
