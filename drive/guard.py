@@ -23,6 +23,7 @@ from common.backoff import Backoff
 from common.errors import ExitCode
 from drive.episode import Episode
 from drive.machine import OnLoss
+from drive.reach import ReachSaid
 from drive.real_time import delayed_by
 from drive.stop_file import StopFile, Stops
 from drive.values import MS, ZERO, Latch, Velocity
@@ -61,6 +62,9 @@ class ZeroPort(Protocol):
 
     def publish(self, velocity: Velocity) -> None:
         """Publishes a velocity."""
+
+    def matched(self) -> int:
+        """Returns how many subscriptions take the zeros."""
 
     def wait_until_acknowledged(self) -> None:
         """Waits, for a moment, until the last velocity has arrived."""
@@ -180,19 +184,21 @@ class Guard:
 
         Zeros go out until the first, where a driver had the robot before.
         """
+        reach = ReachSaid(heartbeats)
         while True:
             wait_s = max(0.0, (watch.deadline_ns - time.monotonic_ns()) / 1e9)
             if not watch.began:
                 wait_s = min(wait_s, self._publish_zero())
             self._heartbeats.send()
             if _is_readable(heartbeats, min(wait_s, _LONGEST_WAIT_S)):
-                beat = heartbeats.recv(_MAX_BEAT_BYTES)
+                beat = _received(heartbeats)
                 if not beat:
                     return ""
                 try:
                     self._take_beat(beat, watch)
                 except DecodeError:
                     return "the worker sends what is no heartbeat, and is killed"
+                reach.say(self._velocities.matched())
             elif watch.silent(now_ns := time.monotonic_ns()):
                 silent_ms = (now_ns - watch.heard_ns) // MS
                 return f"no heartbeat of the worker for {silent_ms} ms, {delayed_by(pid)}: it is killed"
@@ -250,6 +256,13 @@ class Guard:
 def _is_readable(waited_for: socket.socket, timeout_s: float) -> bool:
     ready, _, _ = select.select([waited_for], [], [], max(0.0, timeout_s))
     return bool(ready)
+
+
+def _received(heartbeats: socket.socket) -> bytes:
+    """Returns the next heartbeat, which has arrived; empty at their end."""
+    with suppress(ConnectionResetError):  # Once, of a worker that has ended before it has read all.
+        return heartbeats.recv(_MAX_BEAT_BYTES)
+    return heartbeats.recv(_MAX_BEAT_BYTES)
 
 
 def worker_heartbeats() -> socket.socket:

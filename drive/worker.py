@@ -17,6 +17,7 @@ from drive.endpoint import Endpoint, Peer, Received
 from drive.episode import Episode, followed
 from drive.machine import EndLease, Event, Observe, Rules, State, Stop, Tick, step
 from drive.phases import RESTING, Phase
+from drive.reach import ReachHeard
 from drive.values import MS, ZERO, LeaseEnd, Surroundings, Velocity
 from omniseer.drive.v1 import drive_pb2 as pb
 
@@ -43,6 +44,7 @@ _CONFIRMED: Final = frozenset({"desired", "stop", "reset"})
 _GUARD_NS: Final = 700 * MS
 """For a guard that has to be scheduled among everything else."""
 _COLLECT_EVERY_NS: Final = 60_000 * MS
+_NOT_GUARDED: Final = "the guard of robot-drive does not reach the base yet, and could not stop it"
 
 
 class BasePort(Protocol):
@@ -56,6 +58,9 @@ class BasePort(Protocol):
 
     def observed(self, now_ns: int) -> Surroundings:
         """Returns what the graph says now."""
+
+    def matched(self) -> int:
+        """Returns how many subscriptions take the velocities."""
 
     def problems(self) -> list[str]:
         """Returns what does not work, for people."""
@@ -91,6 +96,8 @@ class Worker:
         self._base = base
         self._endpoint = endpoint
         self._heartbeats = heartbeats
+        self._reach = ReachHeard(heartbeats)
+        self._guard_problem = ""
         self._rules = rules
         self._state = state
         self._revision = 0
@@ -201,9 +208,13 @@ class Worker:
             gc.collect()
 
     def _surroundings(self, now_ns: int) -> Surroundings:
+        observed = self._base.observed(now_ns)
+        guarded = self._reach.reaches(self._base.matched() if observed.base_present else 0, now_ns)
+        self._guard_problem = _NOT_GUARDED if observed.base_present and not guarded else ""
         age_ns = now_ns - self._picture_ns
         return replace(
-            self._base.observed(now_ns),
+            observed,
+            base_present=observed.base_present and guarded,
             preview_running=age_ns <= _PICTURE_NS and self._picture.running,
             # A running camera has captured since; its age is judged by what the driver saw.
             newest_capture_ns=self._picture.newest_capture_ns + age_ns,
@@ -283,8 +294,12 @@ class Worker:
             revision=self._revision,
             counters=self._counters,
             episode=self._episode,
-            problems=self._base.problems(),
+            problems=self._problems(),
         )
+
+    def _problems(self) -> list[str]:
+        problems = self._base.problems()
+        return [*problems, self._guard_problem] if self._guard_problem else problems
 
     def _count(self, event: Event, before: State, after: State) -> None:
         counters = self._counters

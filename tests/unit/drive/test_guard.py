@@ -40,19 +40,30 @@ for number in range(1_000_000):
         begin()
     state = pb.ActualState(phase=phase, episode=episode)
     beats.send(b"\\xff\\xff" if then == "garbage" else state.SerializeToString())
+    if then == "listen":
+        try:
+            word = beats.recv(1, socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            word = b""
+        with open(started + ".heard", "ab") as file:
+            file.write(word)
     time.sleep(0.01)
 """
 
 
 @dataclass
 class Zeros:
-    """The guard's publisher."""
+    """The guard's publisher, and how many subscriptions take its zeros."""
 
     at_s: list[float] = field(default_factory=list)
+    takers: int = 1
 
     def publish(self, velocity: Velocity) -> None:
         assert velocity == ZERO
         self.at_s.append(time.monotonic())
+
+    def matched(self) -> int:
+        return self.takers
 
     def wait_until_acknowledged(self) -> None:
         pass
@@ -190,3 +201,12 @@ def test_the_number_of_the_last_stop_is_kept(tmp_path: Path) -> None:
         os.kill(running.worker(), signal.SIGKILL)
         wait_until(running.stop_file.exists, "the stop is kept")
         wait_until(lambda: read_stops(running.stop_file).last_id == 8, "with the next number")
+
+
+def test_the_worker_learns_how_many_take_the_guards_zeros(tmp_path: Path) -> None:
+    with guarding(tmp_path, "listen") as running:
+        running.worker()
+        heard = tmp_path / "started.heard"
+        wait_until(lambda: heard.exists() and heard.read_bytes() == b"1", "it reaches the base")
+        running.zeros.takers = 0
+        wait_until(lambda: heard.read_bytes() == b"10", "it does not any more")

@@ -30,6 +30,7 @@ class World:
         self.surroundings = CLEAR
         self.observing_takes_ns = 0
         self.guard_gone = False
+        self.guard_says = deque([b"1"])
         self.sequence = 0
         monkeypatch.setattr(worker_module, "time", SimpleNamespace(monotonic_ns=lambda: self.now_ns))
         monkeypatch.setattr(worker_module, "gc", SimpleNamespace(collect=int, freeze=int, disable=int))
@@ -57,6 +58,11 @@ class World:
                 raise BrokenPipeError
             self.journal.append(("beat", pb.ActualState.FromString(message), self.now_ns))
 
+    def recv(self, *_: int) -> bytes:
+        if self.guard_says:
+            return self.guard_says.popleft()
+        raise BlockingIOError
+
     def publish(self, velocity: Velocity, _now_ns: int) -> None:
         self.journal.append(("velocity", velocity, self.now_ns))
 
@@ -66,6 +72,9 @@ class World:
     def observed(self, _now_ns: int) -> Surroundings:
         self.now_ns += self.observing_takes_ns
         return self.surroundings
+
+    def matched(self) -> int:
+        return 1
 
     def problems(self) -> list[str]:
         return []
@@ -339,3 +348,32 @@ def test_without_a_driver_a_frozen_guard_ends_nothing(world: World) -> None:
         for ms in range(0, 100_000, 100):
             world.end(ms)
         world.worker.run()
+
+
+def test_nothing_moves_before_the_guard_reaches_the_base(world: World) -> None:
+    world.guard_says.clear()
+    world.drives()
+    world.end(210)
+    world.worker.run()
+    assert not world.moving()
+    report = world.worker._actual(world.now_ns)
+    assert list(report.inhibits) == [pb.INHIBIT_BASE_ABSENT]
+    assert list(report.problems) == [
+        "the guard of robot-drive does not reach the base yet, and could not stop it"
+    ]
+
+
+def test_a_guard_that_reaches_the_base_no_more_ends_the_motion(world: World) -> None:
+    world.drives()
+    observed = world.observed
+
+    def loses_it(now_ns: int) -> Surroundings:
+        if now_ns >= START_NS + 150 * MS:
+            world.guard_says.append(b"0")
+        return observed(now_ns)
+
+    setattr(world, "observed", loses_it)  # noqa: B010
+    world.end(210)
+    world.worker.run()
+    assert world.moving()
+    assert max(world.moving()) < 150

@@ -1,0 +1,80 @@
+"""A worker whose guard can't stop the base: the test plays the guard, all else is real."""
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+
+from drive.guard import HEARTBEATS, KILLS, STOPS
+from drive.reach import ReachSaid
+from drive.stop_file import Stops
+from omniseer.drive.v1 import drive_pb2 as pb
+from tests.support.driving import Driving, witness
+from tests.support.ros import simulated_robot
+from tests.support.waiting import wait_until
+
+pytestmark = [pytest.mark.ros, pytest.mark.timed]
+
+PROBLEM = "the guard of robot-drive does not reach the base yet, and could not stop it"
+ENOUGH = 9
+"""Subscriptions that the guard claims to have matched: no fewer than there are."""
+
+
+@contextmanager
+def worker_alone(robot: Driving) -> Iterator[socket.socket]:
+    """Runs the worker; yields the guard's end of the heartbeats, which are read."""
+    config = robot.directory / "drive.yaml"
+    values = {"socket": str(robot.socket), "state_dir": str(robot.directory)}
+    config.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with ours:
+        with theirs:
+            known = {HEARTBEATS: str(theirs.fileno()), STOPS: Stops().as_json(), KILLS: "0"}
+            command = [sys.executable, "-m", "drive.cli", "worker", "--config", str(config)]
+            robot.guard = subprocess.Popen(command, env=os.environ | known, pass_fds=[theirs.fileno()])
+
+        def read() -> None:
+            with suppress(ConnectionResetError):
+                while ours.recv(65536):
+                    pass
+
+        reading = threading.Thread(target=read, name="heartbeats")
+        reading.start()
+        try:
+            yield ours
+        finally:
+            robot.close()
+            reading.join(10)
+
+
+def test_nothing_moves_before_the_guards_own_zeros_would_arrive(
+    tmp_path: Path,
+    ros_domain: int,  # noqa: ARG001  # for its effect
+) -> None:
+    with simulated_robot(tmp_path, "--base", "commander=nobody") as base, witness() as seen:
+        robot = Driving(base, seen, tmp_path)
+        with worker_alone(robot) as worker:
+            guard = ReachSaid(worker)
+            peer = robot.ready()
+            peer.send(lease="anna", held=False)
+            wait_until(lambda: robot.state().newest_sequence > 10, "the worker has commands")
+            wait_until(lambda: list(robot.state().problems) == [PROBLEM], "all but the guard is there")
+            peer.send(held=True)
+            since_ns = time.monotonic_ns()
+            wait_until(lambda: robot.state().monotonic_ns > since_ns + 1_000_000_000, "a second")
+            assert list(robot.state().inhibits) == [pb.INHIBIT_BASE_ABSENT]
+            assert not robot.witness.motion_since(since_ns)
+            guard.say(ENOUGH)
+            robot.drive()
+            guard.say(0)
+            robot.phase_is("INHIBITED")
+            robot.settled()
+            assert not robot.witness.moves()
