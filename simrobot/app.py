@@ -5,6 +5,7 @@ import os
 import time
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,9 @@ async def run_robot(
     def change(fields: dict[str, Any]) -> dict[str, Any]:
         return robot.change(fields, time.monotonic()).model_dump(mode="json")
 
+    def heard() -> dict[str, Any] | None:
+        return asdict(base.heard) if base and base.heard else None
+
     published = frozenset(topic for topic, rate_hz in rates_hz.items() if rate_hz > 0)
     if base:
         published -= {Topic.EFFECTIVE_COMMAND}  # The mux's, then.
@@ -52,7 +56,7 @@ async def run_robot(
         actions = dict(publish)
         if train:
             actions[Topic.EFFECTIVE_COMMAND] = lambda: _use_joystick(robot, train)
-        async with listening(control, change), asyncio.TaskGroup() as group:
+        async with listening(control, change, heard), asyncio.TaskGroup() as group:
             tasks = [
                 group.create_task(call_at_rate(rates_hz[topic] or COMMANDS_HZ, action))
                 for topic, action in actions.items()

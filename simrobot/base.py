@@ -24,20 +24,41 @@ class Twist:
 STILL: Final = Twist()
 
 
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """What the base has received of its last motion; instants in monotonic seconds.
+
+    Attributes:
+        moved_s: when the last velocity other than zero came.
+        zero_s: when the first zero after it came; None while there was none.
+    """
+
+    moved_s: float
+    zero_s: float | None = None
+
+
 class Base:
     """Follows the last velocity until its timeout.
 
     The firmware compares microseconds of 32 bits: 71.6 minutes after the last message that one is young again
     for the length of the timeout. A last message other than zero then moves the robot.
+
+    Attributes:
+        heard: of its last motion; None before the first.
     """
 
     def __init__(self) -> None:
         self._last: tuple[Twist, int] | None = None
+        self.heard: Heard | None = None
 
     def receive(self, wanted: Twist, now_s: float) -> None:
         """Takes a velocity."""
         # One assignment: another thread reads it.
         self._last = clamped(wanted), int(now_s * 1e6)
+        if wanted != STILL:
+            self.heard = Heard(now_s)
+        elif self.heard and self.heard.zero_s is None:
+            self.heard = Heard(self.heard.moved_s, now_s)
 
     def velocity(self, now_s: float) -> Twist:
         """Returns how the robot moves."""

@@ -78,6 +78,7 @@ class Action(Enum):
     """What `simrobot control` does with its further arguments."""
 
     SHOW = "show"
+    BASE = "base"
     SILENCE = "silence"
     RESUME = "resume"
     SET = "set"
@@ -85,17 +86,26 @@ class Action(Enum):
 
 @app.command("control")
 def change(
-    action: Annotated[Action, typer.Argument(help="silence and resume take topics, set takes FIELD=VALUE.")],
+    action: Annotated[
+        Action,
+        typer.Argument(help="silence and resume take topics, set takes FIELD=VALUE, show and base nothing."),
+    ],
     arguments: Annotated[list[str] | None, typer.Argument(metavar="[TOPIC | FIELD=VALUE]...")] = None,
     control: ControlPath = None,
 ) -> None:
-    """Changes a running robot and prints its behaviour as JSON.
+    """Changes a running robot and prints its behaviour as JSON; base prints what its base has received.
 
     Fields: silent, not_a_number (topics, separated by commas), speed_mps, turn_rad_s, infer_errors_per_s,
     detection_count, battery_percent, battery_drain_percent_per_s, commander (keyboard, autonomy, navigation,
     unseen, nobody), mode, components (drive:error,lidar:stale).
+
+    Of the base: when the last velocity other than zero came (moved_s), and the first zero after it (zero_s),
+    in seconds of the monotonic clock.
     """
     path = control or control_socket.default_path()
+    if action is Action.BASE:
+        print(json.dumps(control_socket.ask_base(path), indent=2))
+        return
     print(json.dumps(control_socket.ask(path, _request(action, arguments or [], path)), indent=2))
 
 

@@ -1,7 +1,8 @@
 """Control socket of a running robot: requests and responses are JSON objects, one per line.
 
-A request holds the fields of `Behaviour` to change; {} only reads. The response is {"behaviour": {...}} or
-{"error": "..."}. Only the same user can connect: the mode of the Unix socket is 0600.
+A request holds the fields of `Behaviour` to change; {} only reads. The response is {"behaviour": {...},
+"base": {...}} or {"error": "..."}; "base" is what the base has heard of its last motion, null before the
+first and without a base. Only the same user can connect: the mode of the Unix socket is 0600.
 """
 
 import asyncio
@@ -9,7 +10,7 @@ import json
 import os
 import socket
 import tempfile
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,8 @@ _TIMEOUT_S = 5.0
 
 Change = Callable[[dict[str, Any]], dict[str, Any]]
 """Applies the given fields and returns the resulting behaviour; raises UserError."""
+BaseFacts = Callable[[], Mapping[str, Any] | None]
+"""Returns what the base has heard of its last motion (simrobot.base.Heard)."""
 
 
 def default_path() -> Path:
@@ -30,7 +33,7 @@ def default_path() -> Path:
 
 
 @asynccontextmanager
-async def listening(path: Path, change: Change) -> AsyncIterator[None]:
+async def listening(path: Path, change: Change, base: BaseFacts = lambda: None) -> AsyncIterator[None]:
     """Serves requests until the block ends.
 
     Raises:
@@ -41,7 +44,7 @@ async def listening(path: Path, change: Change) -> AsyncIterator[None]:
         mask = os.umask(0o177)
         try:
             server = await asyncio.start_unix_server(
-                lambda reader, writer: _serve(reader, writer, change), path, limit=_LONGEST_LINE
+                lambda reader, writer: _serve(reader, writer, change, base), path, limit=_LONGEST_LINE
             )
         finally:
             os.umask(mask)
@@ -62,13 +65,28 @@ def ask(path: Path, fields: dict[str, Any]) -> dict[str, Any]:
     Raises:
         UserError: no robot responds (exit code 3), or it refuses.
     """
+    behaviour: dict[str, Any] = _answered(path, fields)["behaviour"]
+    return behaviour
+
+
+def ask_base(path: Path) -> dict[str, Any] | None:
+    """Returns what the base has heard of its last motion; None before the first, and without a base.
+
+    Raises:
+        UserError: no robot responds (exit code 3).
+    """
+    heard: dict[str, Any] | None = _answered(path, {}).get("base")
+    return heard
+
+
+def _answered(path: Path, fields: dict[str, Any]) -> dict[str, Any]:
     try:
         with socket.socket(socket.AF_UNIX) as connection:
             connection.settimeout(_TIMEOUT_S)
             connection.connect(str(path))
             connection.sendall(json.dumps(fields).encode() + b"\n")
             with connection.makefile("rb") as lines:
-                answer = json.loads(lines.readline())
+                answer: dict[str, Any] = json.loads(lines.readline())
     except (OSError, ValueError) as error:
         raise UserError(
             f"no simulated robot answers at {path}: {error}",
@@ -77,8 +95,7 @@ def ask(path: Path, fields: dict[str, Any]) -> dict[str, Any]:
         ) from error
     if "error" in answer:
         raise UserError(answer["error"], exit_code=ExitCode.USAGE)
-    behaviour: dict[str, Any] = answer["behaviour"]
-    return behaviour
+    return answer
 
 
 def _remove_stale(path: Path) -> None:
@@ -101,10 +118,12 @@ def _remove(path: Path) -> None:
     path.unlink(missing_ok=True)
 
 
-async def _serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, change: Change) -> None:
+async def _serve(
+    reader: asyncio.StreamReader, writer: asyncio.StreamWriter, change: Change, base: BaseFacts
+) -> None:
     try:
         while line := await reader.readline():
-            writer.write(json.dumps(_answer(line, change)).encode() + b"\n")
+            writer.write(json.dumps(_answer(line, change, base)).encode() + b"\n")
             await writer.drain()
     except (ConnectionError, ValueError):
         pass  # The client has gone, or sent a line beyond the limit: only this connection ends.
@@ -112,12 +131,12 @@ async def _serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, cha
         writer.close()
 
 
-def _answer(line: bytes, change: Change) -> dict[str, Any]:
+def _answer(line: bytes, change: Change, base: BaseFacts) -> dict[str, Any]:
     try:
         fields = json.loads(line)
         if not isinstance(fields, dict):
             return {"error": "a request is a JSON object"}
-        return {"behaviour": change(fields)}
+        return {"behaviour": change(fields), "base": base()}
     except ValueError as error:
         return {"error": f"a request is one line of JSON: {error}"}
     except UserError as error:

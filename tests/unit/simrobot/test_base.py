@@ -2,7 +2,7 @@
 
 import pytest
 
-from simrobot.base import STILL, Base, Twist, clamped
+from simrobot.base import STILL, Base, Heard, Twist, clamped
 from simrobot.behaviour import Behaviour
 from simrobot.robot import Robot
 
@@ -44,3 +44,17 @@ def test_the_robot_goes_where_its_base_moves() -> None:
         base.receive(Twist(vx_mps=0.1, vy_mps=-0.1), 101.0 + tick / 100)
         robot.advance(101.0 + (tick + 1) / 100)
     assert (robot.pose.x_m, robot.pose.y_m) == pytest.approx((0.1, -0.1))
+
+
+def test_it_remembers_when_zero_followed_its_last_motion() -> None:
+    base = Base()
+    base.receive(STILL, 9.0)
+    assert (base.heard,) == (None,)
+    base.receive(FORWARD, 10.0)
+    base.receive(FORWARD, 10.02)
+    assert base.heard == Heard(10.02)
+    base.receive(STILL, 10.1)
+    base.receive(STILL, 12.0)
+    assert base.heard == Heard(10.02, 10.1), "the first zero counts"
+    base.receive(FORWARD, 13.0)
+    assert base.heard == Heard(13.0)

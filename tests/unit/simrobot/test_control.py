@@ -8,7 +8,7 @@ import pytest
 
 from common.errors import ExitCode, UserError
 from simrobot.behaviour import Behaviour
-from simrobot.control import ask, listening
+from simrobot.control import ask, ask_base, listening
 from simrobot.robot import Robot
 
 
@@ -22,6 +22,14 @@ async def test_a_request_changes_the_robot_and_is_answered(tmp_path: Path) -> No
         answer = await asyncio.to_thread(ask, tmp_path / "s", {"speed_mps": 1.5})
     assert answer["speed_mps"] == 1.5
     assert robot.behaviour.speed_mps == 1.5
+
+
+async def test_what_the_base_has_heard_is_answered(tmp_path: Path) -> None:
+    facts = {"moved_s": 10.0, "zero_s": None}
+    async with listening(tmp_path / "s", changes(Robot(Behaviour(), 0.0)), lambda: facts):
+        assert await asyncio.to_thread(ask_base, tmp_path / "s") == facts
+    async with listening(tmp_path / "s", changes(Robot(Behaviour(), 0.0))):
+        assert await asyncio.to_thread(ask_base, tmp_path / "s") is None
 
 
 async def test_a_refusal_reaches_the_client(tmp_path: Path) -> None:
