@@ -13,7 +13,7 @@ from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.mapping.status import overlay_snapshot
 from gateway.status.board import Board
 from gateway.status.preview import Counters, PreviewState, PreviewView
-from gateway.status.snapshot import Identity, Rules, SourceRule, take
+from gateway.status.snapshot import Identity, Programs, Rules, Setup, SourceRule, take
 from gateway.status.values import Received
 
 MODE: Final = SourceSettings(kind="mode", topic="/mode", type="std_msgs/msg/String", stale_after_ms=1000)
@@ -72,13 +72,6 @@ def _serve(source: SourceSettings, value: Any) -> None:
     board = Board()
     board[source.spec] = Received(value, 1.0)
     board[source.spec] = Received(value, 1.5)
-    now = take(
-        identity=Identity("fuzz", "0", insecure=False),
-        rules=_RULES,
-        board=board,
-        preview=_PREVIEW,
-        events=(),
-        now_s=2.0,
-    )
+    now = take(Setup(Identity("fuzz", "0", insecure=False), _RULES), board, Programs(_PREVIEW), now_s=2.0)
     answer = overlay_snapshot(now, Recipient("127.0.0.1", sees_passphrase=True)).SerializeToString()
     assert len(answer) < 1_000_000

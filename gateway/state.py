@@ -16,7 +16,7 @@ from gateway.status.faults.tracker import FaultTracker
 from gateway.status.pictures import NO_PICTURES, PictureReport, PictureReports, Pictures
 from gateway.status.preview import PreviewView
 from gateway.status.recording import RecorderView
-from gateway.status.snapshot import Identity, Runtime, Snapshot, take
+from gateway.status.snapshot import Identity, Noted, Programs, Runtime, Setup, Snapshot, take
 from gateway.status.teleop import TeleopView
 
 
@@ -103,10 +103,8 @@ class State:
         cloud: CloudSource | None,
     ) -> None:
         faults = settings.faults
-        self._identity = Identity(
-            settings.name, project_version(), settings.security.insecure and not settings.security.guarded
-        )
-        self._rules = settings.status_rules()
+        insecure = settings.security.insecure and not settings.security.guarded
+        self._setup = Setup(Identity(settings.name, project_version(), insecure), settings.status_rules())
         self._events = events
         self._preview = preview
         self._access = access
@@ -135,21 +133,20 @@ class State:
     def snapshot(self) -> Snapshot:
         """Returns everything at this instant, from memory."""
         now_s = time.monotonic()
-        return take(
-            identity=self._identity,
-            gateway=self._runtime(now_s),
-            rules=self._rules,
-            board=self.board,
+        programs = Programs(
             preview=self._preview.view,
-            pictures=self._counting_pictures(now_s),
-            events=self._events.log.newest(),
-            faults=self._tracker.faults,
-            now_s=now_s,
-            access=self._access.view(),
             teleop=self._teleop.view() if self._teleop else None,
             recorder=self._recorder.view if self._recorder else None,
             cloud=self._cloud.view if self._cloud else None,
         )
+        noted = Noted(
+            events=self._events.log.newest(),
+            faults=self._tracker.faults,
+            gateway=self._runtime(now_s),
+            access=self._access.view(),
+            pictures=self._counting_pictures(now_s),
+        )
+        return take(self._setup, self.board, programs, now_s, noted)
 
     def observe(self) -> Snapshot:
         """Updates faults and events from a snapshot of this instant, and returns that."""

@@ -127,23 +127,49 @@ class Snapshot:
 _UNKNOWN: Final = Runtime("", "", 0, 0, 0, 0)
 
 
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """What stays the same while the gateway runs."""
+
+    identity: Identity
+    rules: Rules
+
+
+@dataclass(frozen=True, slots=True)
+class Programs:
+    """The robot's other programs at one instant, as far as the robot is set up for them."""
+
+    preview: PreviewView
+    teleop: TeleopView | None = None
+    recorder: RecorderView | None = None
+    cloud: CloudView | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Noted:
+    """What the gateway itself has noted at one instant.
+
+    Attributes:
+        events: the overlay's short list, oldest first.
+        faults: present ones, and those that were cleared a short while ago.
+        pictures: what viewers report of the pictures that they show.
+    """
+
+    events: tuple[OperatorEvent, ...] = ()
+    faults: tuple[Fault, ...] = ()
+    gateway: Runtime = _UNKNOWN
+    access: AccessView = UNGUARDED
+    pictures: Pictures = NO_PICTURES
+
+
+NOTHING_NOTED: Final = Noted()
+
+
 def take(
-    *,
-    identity: Identity,
-    rules: Rules,
-    board: Board,
-    preview: PreviewView,
-    events: tuple[OperatorEvent, ...],
-    now_s: float,
-    faults: tuple[Fault, ...] = (),
-    gateway: Runtime = _UNKNOWN,
-    access: AccessView = UNGUARDED,
-    pictures: Pictures = NO_PICTURES,
-    teleop: TeleopView | None = None,
-    recorder: RecorderView | None = None,
-    cloud: CloudView | None = None,
+    setup: Setup, board: Board, programs: Programs, now_s: float, noted: Noted = NOTHING_NOTED
 ) -> Snapshot:
     """Returns the snapshot of `now_s`. Reads memory only, so that a call never waits for ROS or the disk."""
+    rules, preview = setup.rules, programs.preview
     configured = rules.sources
     samples = {spec: sample(board[spec], rule.stale_after_ms, now_s) for spec, rule in configured.items()}
     for spec in PLATFORM_SOURCES:
@@ -151,8 +177,8 @@ def take(
     ros_stalled = board.ros_passed_s is not None and now_s - board.ros_passed_s > ROS_STALLED_AFTER_S
     return Snapshot(
         at_s=now_s,
-        identity=identity,
-        gateway=gateway,
+        identity=setup.identity,
+        gateway=noted.gateway,
         health=NOT_READ
         if ros_stalled
         else assess(
@@ -162,14 +188,14 @@ def take(
                 for spec in dict.fromkeys((*ROS_SOURCES, *configured))
                 if spec in configured and configured[spec].required
             ),
-            faults,
+            noted.faults,
             rules.ignored_by_health,
         ),
         samples=samples,
         command=_command(rules, board, now_s),
         preview=preview,
         preview_measured=sample(preview.measured, MEASUREMENT_STALE_AFTER_MS, now_s),
-        pictures=pictures,
+        pictures=noted.pictures,
         sources=tuple(
             source_view(
                 spec,
@@ -182,13 +208,13 @@ def take(
             )
             for spec, rule in configured.items()
         ),
-        events=events,
-        faults=faults,
-        access=access,
+        events=noted.events,
+        faults=noted.faults,
+        access=noted.access,
         ros_stalled=ros_stalled,
-        teleop=teleop,
-        recorder=recorder,
-        cloud=cloud,
+        teleop=programs.teleop,
+        recorder=programs.recorder,
+        cloud=programs.cloud,
     )
 
 

@@ -38,7 +38,17 @@ from gateway.status.preview import (
     Profile,
     Stream,
 )
-from gateway.status.snapshot import Identity, Rules, Runtime, Snapshot, SourceRule, take
+from gateway.status.snapshot import (
+    Identity,
+    Noted,
+    Programs,
+    Rules,
+    Runtime,
+    Setup,
+    Snapshot,
+    SourceRule,
+    take,
+)
 from gateway.status.sources import ODOMETRY, VISION, SourceSpec, number_source, text_source
 from gateway.status.values import Number, Received, Text, Velocity
 from tests.support.cloud_views import uploading_view
@@ -64,20 +74,18 @@ FAULT = Condition("odometry.stale", Severity.ERROR, "odometry", "it stopped", "l
 
 def snapshot(preview: PreviewView = PREVIEW) -> Snapshot:
     """Odometry 0.25 s old, vision never seen."""
-    return take(
-        identity=Identity('lab "7"', "1.2.3", insecure=False),
-        rules=Rules({ODOMETRY: SourceRule(1000, True), VISION: SourceRule(2000, True)}, 3000),
-        board=Board({ODOMETRY: Received(Velocity(0.3, 0.4, -0.5), NOW_S - 0.25)}),
-        preview=preview,
-        events=(),
-        now_s=NOW_S,
+    setup = Setup(
+        Identity('lab "7"', "1.2.3", insecure=False),
+        Rules({ODOMETRY: SourceRule(1000, True), VISION: SourceRule(2000, True)}, 3000),
+    )
+    board = Board({ODOMETRY: Received(Velocity(0.3, 0.4, -0.5), NOW_S - 0.25)})
+    programs = Programs(preview, stopped_view(NOW_S), recording_view(NOW_S), uploading_view(NOW_S))
+    noted = Noted(
         faults=(Fault(FAULT, 1.0, 2.0, None, 1), Fault(FAULT, 1.0, 2.0, 3.0, 1)),
         gateway=Runtime("abc", "boot", 61_500, 3, 10, 1),
         pictures=Pictures(viewer_count=2, worst_age_ms=140, link_age_ms=138),
-        teleop=stopped_view(NOW_S),
-        recorder=recording_view(NOW_S),
-        cloud=uploading_view(NOW_S),
     )
+    return take(setup, board, programs, NOW_S, noted)
 
 
 class World:
@@ -205,10 +213,10 @@ def test_the_values_of_the_configuration_that_can_be_relied_on() -> None:
         for label in ("gripper", "lamp", "door")
     )
     sources: tuple[SourceSpec[Any], ...] = (fresh, stale, unknown, missing, gripper, lamp, door)
+    rules = Rules(dict.fromkeys(sources, SourceRule(1000, False)), 3000)
     now = take(
-        identity=Identity("lab", "1.2.3", insecure=False),
-        rules=Rules(dict.fromkeys(sources, SourceRule(1000, False)), 3000),
-        board=Board(
+        Setup(Identity("lab", "1.2.3", insecure=False), rules),
+        Board(
             {
                 fresh: Received(Number(0.0), NOW_S),
                 stale: Received(Number(7.0), NOW_S - 2),
@@ -218,9 +226,8 @@ def test_the_values_of_the_configuration_that_can_be_relied_on() -> None:
                 door: Received(Text("jammed"), NOW_S - 2),
             }
         ),
-        preview=PREVIEW,
-        events=(),
-        now_s=NOW_S,
+        Programs(PREVIEW),
+        NOW_S,
     )
     shown = values(Stats(), now)
     numbers = {labels: value for (name, labels), value in shown.items() if name == "robot_gateway_number"}

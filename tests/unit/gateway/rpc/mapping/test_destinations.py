@@ -32,7 +32,17 @@ from gateway.status.preview import (
     Profile,
     Stream,
 )
-from gateway.status.snapshot import Identity, Rules, Runtime, Snapshot, SourceRule, take
+from gateway.status.snapshot import (
+    Identity,
+    Noted,
+    Programs,
+    Rules,
+    Runtime,
+    Setup,
+    Snapshot,
+    SourceRule,
+    take,
+)
 from gateway.status.sources import (
     BATTERY,
     COMPUTE,
@@ -118,21 +128,17 @@ def snapshot(
     conditions = [
         Condition(f"id {n}", Severity.WARNING, f"part {n}", f"fault {n}", f"remedy {n}") for n in (1, 2)
     ]
-    return take(
-        identity=Identity("a name", "a version", insecure=insecure),
-        rules=RULES,
-        board=Board(board),
-        preview=preview,
+    noted = Noted(
         events=(OperatorEvent(201, NOW_S - 202, "an event"),),
-        gateway=Runtime("a revision", "a boot", 203, 204, 205, 206, "a run"),
         faults=(
             Fault(conditions[0], NOW_S - 207, NOW_S, None, 208),
             Fault(conditions[1], NOW_S - 209, NOW_S - 210, NOW_S - 210, 211),
         ),
-        now_s=now_s,
+        gateway=Runtime("a revision", "a boot", 203, 204, 205, 206, "a run"),
         pictures=Pictures(viewer_count=82, worst_age_ms=141, link_age_ms=139),
-        teleop=stopped_view(now_s),
     )
+    setup = Setup(Identity("a name", "a version", insecure=insecure), RULES)
+    return take(setup, Board(board), Programs(preview, stopped_view(now_s)), now_s, noted)
 
 
 def flat(message: Message, above: str = "") -> dict[str, Any]:

@@ -46,7 +46,17 @@ from gateway.status.recording import (
     RecordingState,
     RecordingStopReason,
 )
-from gateway.status.snapshot import Identity, Rules, Runtime, Snapshot, SourceRule, take
+from gateway.status.snapshot import (
+    Identity,
+    Noted,
+    Programs,
+    Rules,
+    Runtime,
+    Setup,
+    Snapshot,
+    SourceRule,
+    take,
+)
 from gateway.status.source_view import SourceState
 from gateway.status.sources import (
     BATTERY,
@@ -236,25 +246,23 @@ def everything() -> Snapshot:
             GRIPPER: Received(Text("open"), at_s),
         }
     )
-    return take(
-        identity=Identity("lab", "1.2.3", insecure=True),
+    setup = Setup(
+        Identity("lab", "1.2.3", insecure=True),
         # All of them are stale but the one that is required.
-        rules=Rules(
+        Rules(
             {spec: SourceRule(1000, required=False) for spec in ROS_SOURCES}
             | {DIAGNOSTICS: FRESH, CELL: STALE, GRIPPER: STALE},
             3000,
         ),
-        board=board,
-        preview=preview,
-        events=(OperatorEvent(1, at_s, "something happened"),),
-        gateway=Runtime("f" * 40, "boot", 1000, 3, 20, 2, "run"),
-        faults=(Fault(FAULT, at_s - 1, at_s, None, 1), Fault(FAULT, at_s - 3, at_s - 1, at_s, 2)),
-        now_s=NOW_S,
-        pictures=Pictures(1, 140, 138),
-        teleop=stopped_view(NOW_S),
-        recorder=recording_view(at_s),
-        cloud=uploading_view(at_s),
     )
+    programs = Programs(preview, stopped_view(NOW_S), recording_view(at_s), uploading_view(at_s))
+    noted = Noted(
+        events=(OperatorEvent(1, at_s, "something happened"),),
+        faults=(Fault(FAULT, at_s - 1, at_s, None, 1), Fault(FAULT, at_s - 3, at_s - 1, at_s, 2)),
+        gateway=Runtime("f" * 40, "boot", 1000, 3, 20, 2, "run"),
+        pictures=Pictures(1, 140, 138),
+    )
+    return take(setup, board, programs, NOW_S, noted)
 
 
 def merged(items: Any) -> Any:
@@ -328,14 +336,12 @@ def test_the_passphrase_goes_only_to_those_who_sees_passphrase() -> None:
 
 
 def test_an_empty_snapshot_claims_nothing() -> None:
-    nothing = take(
-        identity=Identity("lab", "1.2.3", insecure=False),
-        rules=Rules(dict.fromkeys(ROS_SOURCES, SourceRule(1000, required=True)), 3000),
-        board=Board(),
-        preview=PreviewView(PreviewState.DISABLED, None, "", False, None, None, None, None, Counters()),
-        events=(),
-        now_s=NOW_S,
+    setup = Setup(
+        Identity("lab", "1.2.3", insecure=False),
+        Rules(dict.fromkeys(ROS_SOURCES, SourceRule(1000, required=True)), 3000),
     )
+    off = PreviewView(PreviewState.DISABLED, None, "", False, None, None, None, None, Counters())
+    nothing = take(setup, Board(), Programs(off), NOW_S)
     overlay = overlay_snapshot(nothing, CALLER)
     status = overlay.status
     assert status.health.summary == "waiting for odometry"

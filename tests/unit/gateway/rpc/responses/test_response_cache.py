@@ -5,7 +5,7 @@ from gateway.rpc.mapping.status import overlay_snapshot, system_status
 from gateway.rpc.responses.response_cache import REUSE_S, ResponseCache
 from gateway.status.board import Board
 from gateway.status.preview import Counters, Listener, PreviewState, PreviewView
-from gateway.status.snapshot import Identity, Rules, Snapshot, take
+from gateway.status.snapshot import Identity, Programs, Rules, Setup, Snapshot, take
 from omniseer.gateway.v1.overlay_pb2 import OverlaySnapshot
 from omniseer.gateway.v1.states_pb2 import PREVIEW_RUNNING
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus
@@ -33,14 +33,8 @@ class World:
 
     def snapshot(self) -> Snapshot:
         self.taken += 1
-        return take(
-            identity=Identity("lab", "1", insecure=False),
-            rules=Rules({}, 3000),
-            board=Board(),
-            preview=self.preview,
-            events=(),
-            now_s=self.now_s,
-        )
+        setup = Setup(Identity("lab", "1", insecure=False), Rules({}, 3000))
+        return take(setup, Board(), Programs(self.preview), self.now_s)
 
 
 def test_all_callers_in_time_get_the_same_bytes() -> None:

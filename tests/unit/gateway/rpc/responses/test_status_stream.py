@@ -11,7 +11,7 @@ from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.responses.status_stream import StatusStream
 from gateway.status.board import Board
 from gateway.status.preview import Counters, PreviewState, PreviewView
-from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.snapshot import Identity, Programs, Rules, Setup, Snapshot, SourceRule, take
 from gateway.status.sources import DETECTIONS, ODOMETRY
 from gateway.status.values import Detection, Detections, Received, Velocity
 from omniseer.gateway.v1.robot_gateway_pb2 import WatchSystemStatusResponse
@@ -38,14 +38,8 @@ class World:
 
     def snapshot(self) -> Snapshot:
         self.taken += 1
-        return take(
-            identity=Identity("lab", "1", insecure=False),
-            rules=self._rules,
-            board=self.board,
-            preview=PREVIEW,
-            events=(),
-            now_s=self.now_s,
-        )
+        setup = Setup(Identity("lab", "1", insecure=False), self._rules)
+        return take(setup, self.board, Programs(PREVIEW), self.now_s)
 
     def see(self, *items: Detection) -> None:
         self.board[DETECTIONS] = Received(Detections(1280, 720, len(items), items), self.now_s)
