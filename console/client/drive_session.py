@@ -16,7 +16,7 @@ from common.version import project_version
 from console.client.drive_commands import Commands, Hold
 from console.client.drive_lanes import Lanes, LaneTransport, Opening, Outgoing
 from console.client.drive_reasons import rest_reasons
-from console.client.errors import GatewayError, Refused
+from console.client.errors import Cancelled, GatewayError, Refused
 from console.client.mapping.driving import command_request
 from console.client.results import DriveLimits, DriveOpened, DrivePhase, DriveState, Supervision
 from console.client.robot_clock import RobotClock
@@ -67,6 +67,8 @@ class DriveSession:
         name = options.client_name or f"robotctl {project_version()}"
         opening = Opening(name, options.supervision, options.take_over, opens_within_s)
         self._lanes = Lanes(connect, opening, self._robot, self._changes)
+        self._picture_ns = 0
+        """Of the newest command; the farewell has it, too, whatever becomes of the caller's own code."""
         self._ending = False
         self._sender: asyncio.Task[None] | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -81,6 +83,7 @@ class DriveSession:
         try:
             await self._lanes.open_first()
             self._sender = asyncio.create_task(self._send(), name="drive commands")
+            self._sender.add_done_callback(self._sender_ended)
             await self._lanes.open_others()
         except BaseException:
             await self._close()
@@ -96,8 +99,8 @@ class DriveSession:
         """Releases, and closes the session when the release is on its way."""
         self._ending = True
         self._commands.end_hold()
-        self._lanes.send(self._next_command(last=True))
         try:
+            self._lanes.send(self._next_command(last=True))
             await self._changes.wait_until(lambda: self._lanes.open_count == 0, _FAREWELL_S)
         finally:
             await self._close()
@@ -227,14 +230,21 @@ class DriveSession:
             due_s = max(due_s + 1 / COMMANDS_PER_S, time.monotonic())
             await asyncio.sleep(due_s - time.monotonic())
 
+    def _sender_ended(self, sender: "asyncio.Task[None]") -> None:
+        """Ends the session where the caller's own `picture` has ended the commands by an error."""
+        if not sender.cancelled() and (error := sender.exception()):
+            self._robot.lost(Cancelled(f"no commands are sent any more: {error!r}", "Mend this program"))
+            self._changes.notify_all()
+
     def _send_now(self) -> None:
         # Without an instant of the robot a command would be valid at no time.
         if not self._ending and self._robot.clock.newest_ns:
             self._lanes.send(self._next_command())
 
     def _next_command(self, *, last: bool = False) -> Outgoing:
-        picture_ns = self._options.picture() if self._options.picture else None
-        command = self._commands.make(time.monotonic(), self._robot.clock, picture_ns or 0)
+        if self._options.picture and not last:
+            self._picture_ns = self._options.picture() or 0
+        command = self._commands.make(time.monotonic(), self._robot.clock, self._picture_ns)
         return Outgoing(command.sequence, command.held, command_request(command), last)
 
     async def _close(self) -> None:

@@ -12,7 +12,7 @@ from console.client.blocking import BlockingDriveSession
 from console.client.drive_commands import HOLD_COUNTS_S
 from console.client.drive_lanes import LANES, MAX_UNACKNOWLEDGED, LaneItem
 from console.client.drive_session import COMMANDS_PER_S, DriveOptions, DriveSession
-from console.client.errors import Overloaded, Refused, Unreachable
+from console.client.errors import Cancelled, Overloaded, Refused, Unreachable
 from console.client.loop_thread import LoopThread
 from console.client.mapping.methods import Method
 from console.client.results import DriveLimits, DriveOpened, DrivePhase, DriveState
@@ -287,6 +287,24 @@ async def test_a_lane_that_an_overloaded_robot_refuses_does_not_end_the_session(
         assert (session.open_lanes, session.error) == (1, None)
         robot.opens_with = None
         await until(lambda: session.open_lanes == LANES, "there is room again")
+
+
+async def test_a_picture_that_raises_ends_the_session_with_its_error_and_a_release() -> None:
+    robot = Robot()
+
+    def picture() -> int:
+        if len(robot.commands) >= 3:
+            raise ValueError("a defect")
+        return 7
+
+    options = DriveOptions(picture=picture)
+    async with DriveSession(robot.connect, options, opens_within_s=5.0) as session:
+        await until(lambda: session.error, "it has ended")
+        with pytest.raises(Cancelled, match="a defect"):
+            session.check()
+    assert robot.finished == LANES
+    assert not robot.held
+    assert robot.commands[-1].picture_monotonic_ns == 7
 
 
 async def test_a_velocity_that_is_no_number_is_refused_and_holds_nothing() -> None:
