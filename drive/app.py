@@ -1,5 +1,6 @@
 """Assembles the guard and the worker, each of them a process."""
 
+import gc
 import logging
 import signal
 import sys
@@ -47,6 +48,9 @@ def serve(settings: DriveSettings, config_file: Path | None) -> int:
             signal.signal(number, lambda *_: guard.stop())
         raise_priority(_GUARD_PRIORITY)
         lock_memory()
+        # What lives now stays: a collection that looks at all of it may outlast the guard's patience.
+        gc.collect()
+        gc.freeze()
         code = guard.run()
     stop_file.close()
     return code
