@@ -18,7 +18,7 @@ from common.token_bucket import TokenBucket
 from gateway.links.drive.state import DriveCommand
 from gateway.status.teleop import DriveInhibit, DrivePhase, DriveView, LeaseEnd
 from gateway.status.values import Velocity
-from gateway.teleop.lease import Session
+from gateway.teleop.lease import LANE_SILENT_S, Session
 from gateway.teleop.pacing import Pacing
 
 COMMANDS_PER_S: Final = 200.0
@@ -67,6 +67,9 @@ class Driving:
 class LaneOwner(Protocol):
     """What lanes belong to."""
 
+    def lane_heard(self, driving: Driving, number: int) -> None:
+        """Notes that a command has come on a lane."""
+
     def take(self, driving: Driving, command: DriveCommand, input_device: str) -> None:
         """Takes a command of a lane."""
 
@@ -114,16 +117,24 @@ class Lane:
             )
         if not is_finite(command.velocity):
             raise InvalidRequestError("a velocity is not finite; send numbers, and 0 for no motion")
+        self._teleop.lane_heard(self._driving, self._number)
         self._teleop.take(self._driving, command, input_device)
 
     def facts(self) -> DriveFacts:
         """Returns what the driver has to know at this instant.
 
         Raises:
-            DomainError: the session has ended.
+            DomainError: the session has ended, or another lane has taken the place of this one.
         """
-        if self._driving.session.ended:
-            raise _ended(self._driving.session.ended)
+        session = self._driving.session
+        if session.ended:
+            raise _ended(session.ended)
+        if self._number not in session.lanes:
+            raise TooMuchError(
+                f"this lane has brought nothing for {LANE_SILENT_S:g} s, and another one has taken its place",
+                Reason.TOO_MANY_STREAMS,
+                1.0,
+            )
         return self._teleop.facts(self._driving)
 
     def close(self, why: LeaseEnd) -> None:

@@ -17,6 +17,9 @@ SILENCE_S: Final = 2.0
 RELEASED_S: Final = 2.0
 """An operator may take the lease from a driver who has not held for this long."""
 MAX_LANES: Final = 2
+LANE_SILENT_S: Final = 1.0
+"""A lane that has brought nothing for so long makes room for another one of its session: fifty commands were
+due on it. A driver gives up a connection that has vanished, and opens the next, before the gateway does."""
 
 
 class Demand(Enum):
@@ -123,7 +126,8 @@ class Session:
         heard_s: when the newest command arrived, or the session began.
         held_s: when the driver last held.
         sequence: of the newest command.
-        lanes: open ones; none of a session that does not stream.
+        lanes: open ones by number, with when the newest command came on each; none of a session that does not
+            stream.
         ended: why; None while it has the lease.
     """
 
@@ -134,7 +138,7 @@ class Session:
     heard_s: float
     held_s: float = -math.inf
     sequence: int = 0
-    lanes: set[int] = field(default_factory=set)
+    lanes: dict[int, float] = field(default_factory=dict)
     ended: LeaseEnd | None = None
 
 
@@ -192,17 +196,25 @@ class Lease:
             raise NotInSessionError
         return holder
 
-    def add_lane(self, session: Session) -> int:
-        """Returns the number of a new lane.
+    def add_lane(self, session: Session, now_s: float) -> int:
+        """Returns the number of a new lane; one that is silent makes room for it.
 
         Raises:
-            TooManyLanesError: the session has MAX_LANES.
+            TooManyLanesError: the session has MAX_LANES that are not.
         """
         if len(session.lanes) >= MAX_LANES:
-            raise TooManyLanesError
+            silent = min(session.lanes, key=session.lanes.__getitem__)
+            if now_s - session.lanes[silent] < LANE_SILENT_S:
+                raise TooManyLanesError
+            del session.lanes[silent]
         self._lanes += 1
-        session.lanes.add(self._lanes)
+        session.lanes[self._lanes] = now_s
         return self._lanes
+
+    def lane_heard(self, session: Session, lane: int, now_s: float) -> None:
+        """Notes that a command has come on a lane."""
+        if lane in session.lanes:
+            session.lanes[lane] = now_s
 
     def take(self, session: Session, sequence: int, now_s: float, *, held: bool) -> bool:
         """Takes a command; returns whether it counts: the session has the lease, and the command is newer.
@@ -218,7 +230,7 @@ class Lease:
 
     def lane_gone(self, session: Session, lane: int, why: LeaseEnd) -> bool:
         """Removes a lane; the last one ends the session, and then this returns True."""
-        session.lanes.discard(lane)
+        session.lanes.pop(lane, None)
         if session.ended or session.lanes:
             return False
         self.end(session, why)

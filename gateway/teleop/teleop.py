@@ -136,7 +136,7 @@ class Teleop:
         if take_over:
             demand = Demand.TAKE_OVER_AS_ADMIN if driver.admin else Demand.TAKE_OVER
         driving = self.acquire(driver, demand, line_of_sight=line_of_sight)
-        return Lane(self, driving, self._lease.add_lane(driving.session))
+        return Lane(self, driving, self._lease.add_lane(driving.session, time.monotonic()))
 
     def join_lane(self, driver: Driver, session_id: str) -> Lane:
         """Opens another lane of a session.
@@ -147,7 +147,7 @@ class Teleop:
         self._check_enabled()
         try:
             session = self._lease.find(session_id, driver)
-            number = self._lease.add_lane(session)
+            number = self._lease.add_lane(session, time.monotonic())
         except NotInSessionError:
             raise ConflictError(
                 "there is no such session of this driver; open a new one", Reason.LEASE_LOST
@@ -163,6 +163,10 @@ class Teleop:
         """Closes a lane."""
         if self._lease.lane_gone(driving.session, number, why):
             self._end(driving.session, why)
+
+    def lane_heard(self, driving: Driving, number: int) -> None:
+        """Notes that a command has come on a lane, a copy or not."""
+        self._lease.lane_heard(driving.session, number, time.monotonic())
 
     def take(self, driving: Driving, command: DriveCommand, input_device: str) -> None:
         """Takes a command of a lane, and passes it on unless it is a copy, or too many come."""

@@ -282,7 +282,7 @@ async def test_one_lane_may_go(robot: DrivenRobot, client: AsyncGatewayClient) -
 async def test_a_lane_that_vanishes_comes_back_and_costs_no_session(
     robot: DrivenRobot, client: AsyncGatewayClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """For some seconds the gateway takes the lane that the client has given up for open, and refuses another."""
+    """The gateway takes the lane for open for some seconds more than the client."""
     async with Relay(robot.gateway.port) as relay:
         session = client.drive(BY_EYE)
         targets = chain([robot.target, f"127.0.0.1:{relay.port}"], repeat(robot.target))
@@ -300,7 +300,7 @@ async def test_a_lane_that_vanishes_comes_back_and_costs_no_session(
             await eventually(open_lanes, lambda lanes: lanes == 1, "the client has noticed")
             await in_motion(session, robot.base, SPEED_MPS)
             session.release()
-            await eventually(open_lanes, lambda lanes: lanes == LANES, "and the gateway, some seconds later")
+            await eventually(open_lanes, lambda lanes: lanes == LANES, "a new one has its place")
 
 
 @pytest.fixture

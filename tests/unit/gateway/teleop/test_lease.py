@@ -7,6 +7,7 @@ import pytest
 from gateway.status.teleop import LeaseEnd
 from gateway.teleop.lease import (
     ANSWERS,
+    LANE_SILENT_S,
     MAX_LANES,
     RELEASED_S,
     SILENCE_S,
@@ -93,8 +94,8 @@ def test_an_operator_may_take_over_when_the_driver_has_released_for_long_enough(
 def test_the_first_copy_of_a_command_counts() -> None:
     lease = Lease()
     session = acquired(lease, ANNA)
-    lease.add_lane(session)
-    lease.add_lane(session)
+    lease.add_lane(session, 5.0)
+    lease.add_lane(session, 5.0)
     assert lease.take(session, 1, 0.0, held=False)
     assert not lease.take(session, 1, 0.01, held=True)
     assert session.heard_s == 0.0
@@ -112,7 +113,7 @@ def test_no_command_of_a_session_that_has_ended_counts() -> None:
 def test_a_session_ends_with_its_last_lane() -> None:
     lease = Lease()
     session = acquired(lease, ANNA)
-    first, second = lease.add_lane(session), lease.add_lane(session)
+    first, second = lease.add_lane(session, 5.0), lease.add_lane(session, 5.0)
     assert not lease.lane_gone(session, first, LeaseEnd.LOST)
     assert lease.lane_gone(session, second, LeaseEnd.CLOSED)
     assert (session.ended, lease.holder) == (LeaseEnd.CLOSED, None)
@@ -122,11 +123,28 @@ def test_a_session_ends_with_its_last_lane() -> None:
 def test_a_session_has_no_more_than_two_lanes() -> None:
     lease = Lease()
     session = acquired(lease, ANNA)
-    numbers = [lease.add_lane(session) for _ in range(MAX_LANES)]
+    numbers = [lease.add_lane(session, 5.0) for _ in range(MAX_LANES)]
     with pytest.raises(TooManyLanesError):
-        lease.add_lane(session)
+        lease.add_lane(session, 5.0)
     lease.lane_gone(session, numbers[0], LeaseEnd.LOST)
-    assert lease.add_lane(session) not in numbers
+    assert lease.add_lane(session, 5.0) not in numbers
+
+
+def test_a_lane_that_brings_nothing_makes_room_for_another() -> None:
+    """As one whose connection vanished: its driver notices that before the gateway does."""
+    lease = Lease()
+    session = acquired(lease, ANNA)
+    vanished, other = lease.add_lane(session, 5.0), lease.add_lane(session, 5.0)
+    lease.lane_heard(session, other, 5.0 + LANE_SILENT_S - 0.01)
+    with pytest.raises(TooManyLanesError):
+        lease.add_lane(session, 5.0 + LANE_SILENT_S - 0.01)
+    new = lease.add_lane(session, 5.0 + LANE_SILENT_S)
+    assert set(session.lanes) == {other, new}
+    lease.lane_heard(session, vanished, 7.0)
+    assert not lease.lane_gone(session, vanished, LeaseEnd.LOST), "the others are its lanes now"
+    assert session.ended is None
+    with pytest.raises(TooManyLanesError):
+        lease.add_lane(session, 5.0 + LANE_SILENT_S)
 
 
 def test_only_its_own_driver_joins_a_session() -> None:

@@ -6,6 +6,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from gateway.status.teleop import LeaseEnd
 from gateway.teleop.lease import (
+    LANE_SILENT_S,
     RELEASED_S,
     SILENCE_S,
     Demand,
@@ -55,16 +56,17 @@ class Driving(RuleBasedStateMachine):
         if session not in self.sessions:
             self.sessions.append(session)
         if session.streaming:
-            self.lanes.append((session, self.lease.add_lane(session)))
+            self.lanes.append((session, self.lease.add_lane(session, self.now_s)))
 
     @precondition(lambda self: self.lanes)
     @rule(data=st.data())
     def join(self, data: st.DataObject) -> None:
         session, _ = data.draw(st.sampled_from(self.lanes))
         try:
-            number = self.lease.add_lane(session)
+            number = self.lease.add_lane(session, self.now_s)
         except TooManyLanesError:
             assert len(session.lanes) == 2
+            assert all(self.now_s - heard_s < LANE_SILENT_S for heard_s in session.lanes.values())
         else:
             self.lanes.append((session, number))
 
@@ -73,6 +75,8 @@ class Driving(RuleBasedStateMachine):
     def command(self, data: st.DataObject, sequence: int, held: bool) -> None:
         session = data.draw(st.sampled_from(self.sessions))
         counted = self.counted.setdefault(session.session_id, [])
+        if session.lanes:
+            self.lease.lane_heard(session, data.draw(st.sampled_from(sorted(session.lanes))), self.now_s)
         counts = self.lease.take(session, sequence, self.now_s, held=held)
         assert counts == (session is self.lease.holder and all(sequence > each for each in counted))
         if counts:
@@ -106,6 +110,7 @@ class Driving(RuleBasedStateMachine):
     def a_holder_that_streams_has_a_lane(self) -> None:
         holder = self.lease.holder
         assert holder is None or holder.lanes or not holder.streaming
+        assert holder is None or len(holder.lanes) <= 2
 
 
 TestDriving = Driving.TestCase

@@ -80,7 +80,8 @@ class TeleopServiceServicer:
         FAILED_PRECONDITION: the robot is not set up for driving, driving is or was disabled, or supervision by line
         of sight is not permitted.
         ABORTED: another driver has the lease (see take_over) or took it, or the session has ended.
-        RESOURCE_EXHAUSTED: more than 200 commands a second on one lane, or more than two lanes.
+        RESOURCE_EXHAUSTED: more than 200 commands a second on one lane, or more than two lanes (one that has
+        brought nothing for 1 s makes room for another).
         UNAVAILABLE: the robot's drive program has not answered since the gateway was started.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)

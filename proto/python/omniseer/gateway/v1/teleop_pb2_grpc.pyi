@@ -53,7 +53,8 @@ class TeleopServiceStub:
     FAILED_PRECONDITION: the robot is not set up for driving, driving is or was disabled, or supervision by line
     of sight is not permitted.
     ABORTED: another driver has the lease (see take_over) or took it, or the session has ended.
-    RESOURCE_EXHAUSTED: more than 200 commands a second on one lane, or more than two lanes.
+    RESOURCE_EXHAUSTED: more than 200 commands a second on one lane, or more than two lanes (one that has
+    brought nothing for 1 s makes room for another).
     UNAVAILABLE: the robot's drive program has not answered since the gateway was started.
     """
     StopRobot: _grpc.UnaryUnaryMultiCallable[_teleop_pb2.StopRobotRequest, _teleop_pb2.StopRobotResponse]
@@ -101,7 +102,8 @@ class TeleopServiceAsyncStub(TeleopServiceStub):
     FAILED_PRECONDITION: the robot is not set up for driving, driving is or was disabled, or supervision by line
     of sight is not permitted.
     ABORTED: another driver has the lease (see take_over) or took it, or the session has ended.
-    RESOURCE_EXHAUSTED: more than 200 commands a second on one lane, or more than two lanes.
+    RESOURCE_EXHAUSTED: more than 200 commands a second on one lane, or more than two lanes (one that has
+    brought nothing for 1 s makes room for another).
     UNAVAILABLE: the robot's drive program has not answered since the gateway was started.
     """
     StopRobot: _aio.UnaryUnaryMultiCallable[_teleop_pb2.StopRobotRequest, _teleop_pb2.StopRobotResponse]  # type: ignore[assignment]
@@ -152,7 +154,8 @@ class TeleopServiceServicer(metaclass=_abc_1.ABCMeta):
         FAILED_PRECONDITION: the robot is not set up for driving, driving is or was disabled, or supervision by line
         of sight is not permitted.
         ABORTED: another driver has the lease (see take_over) or took it, or the session has ended.
-        RESOURCE_EXHAUSTED: more than 200 commands a second on one lane, or more than two lanes.
+        RESOURCE_EXHAUSTED: more than 200 commands a second on one lane, or more than two lanes (one that has
+        brought nothing for 1 s makes room for another).
         UNAVAILABLE: the robot's drive program has not answered since the gateway was started.
         """
 
