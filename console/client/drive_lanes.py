@@ -17,6 +17,9 @@ from console.client.results import DriveOpened, DriveState, Supervision
 
 MAX_UNACKNOWLEDGED: Final = 10
 """Commands on their way on one lane; what would queue behind them is too old to count."""
+MAX_UNANSWERED: Final = 100
+"""Commands on one lane since its last state: it has stood still for 2 s. What it holds must not come as more
+at once than the gateway takes (200)."""
 LANES: Final = 2
 _ALL_OPEN_S: Final = 2.5
 """How long the opening waits for all lanes: a lost first packet of a connection comes again after 1 s, and
@@ -126,6 +129,8 @@ class Lanes:
         self._session_id = ""
         self._lost = False
         self._keepers: list[asyncio.Task[None]] = []
+        self._written: list[OnTheirWay] = []
+        """Of the open lanes."""
         self.open_count = 0
 
     async def open_first(self) -> None:
@@ -221,6 +226,7 @@ class Lanes:
             GatewayError: The lane has ended.
         """
         on_their_way = OnTheirWay()
+        self._written.append(on_their_way)
         self.open_count += 1
         self._changes.notify_all()
         writer = asyncio.create_task(self._write(lane, on_their_way), name="drive lane, commands")
@@ -228,9 +234,12 @@ class Lanes:
             while True:
                 item = await lane.read()
                 if isinstance(item, DriveState):
-                    on_their_way.acknowledge(item.newest_sequence)
+                    on_their_way.answered()
+                    for each in self._written:
+                        each.acknowledge(item.newest_sequence)
                     self._user.received(item)
         finally:
+            self._written.remove(on_their_way)
             self.open_count -= 1
             await cancel([writer])
             lane.cancel()
@@ -262,19 +271,29 @@ class Lanes:
 
 
 class OnTheirWay:
-    """The commands that were written on one lane and are not acknowledged yet."""
+    """The commands that were written on one lane and are not acknowledged yet.
+
+    A state on any lane acknowledges. A lane that counted only its own would fall silent whenever a lost
+    packet holds its states up, and leave the robot to the other one alone.
+    """
 
     def __init__(self) -> None:
         self._sequences: list[int] = []
+        self._unanswered = 0
 
     @property
     def full(self) -> bool:
         """Whether another command would only queue behind these."""
-        return len(self._sequences) >= MAX_UNACKNOWLEDGED
+        return len(self._sequences) >= MAX_UNACKNOWLEDGED or self._unanswered >= MAX_UNANSWERED
 
     def add(self, sequence: int) -> None:
         """Adds a command that is written now."""
         self._sequences.append(sequence)
+        self._unanswered += 1
+
+    def answered(self) -> None:
+        """Notes that a state has come on this lane."""
+        self._unanswered = 0
 
     def acknowledge(self, newest: int) -> None:
         """Removes what the robot has received: all commands up to the newest, on whichever lane it came."""

@@ -1,6 +1,6 @@
 """How many commands a lane holds that the robot has not acknowledged."""
 
-from console.client.drive_lanes import MAX_UNACKNOWLEDGED, OnTheirWay
+from console.client.drive_lanes import MAX_UNACKNOWLEDGED, MAX_UNANSWERED, OnTheirWay
 
 
 def test_a_lane_is_full_until_what_was_written_on_it_is_acknowledged() -> None:
@@ -18,3 +18,14 @@ def test_a_lane_is_full_until_what_was_written_on_it_is_acknowledged() -> None:
             lane.add(written)
         full.append(lane.full)
     assert full == [True, True, False, True, False, False]
+
+
+def test_a_lane_that_stands_still_is_full_although_the_other_one_acknowledges() -> None:
+    lane = OnTheirWay()
+    for sequence in range(1, MAX_UNANSWERED + 1):
+        assert not lane.full
+        lane.add(sequence)
+        lane.acknowledge(sequence)
+    assert lane.full
+    lane.answered()
+    assert not lane.full

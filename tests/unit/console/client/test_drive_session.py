@@ -95,10 +95,13 @@ class Robot:
 
 class PlayedLane:
     def __init__(self, robot: Robot) -> None:
-        self._robot, self._opened, self.lost = robot, False, False
+        self._robot, self._opened = robot, False
+        self.lost = self.silent = False
+        self.written = 0
         self._finished = asyncio.Event()
 
     async def write(self, request: bytes) -> None:
+        self.written += 1
         self._robot.take(request)
 
     async def read(self) -> LaneItem:
@@ -114,7 +117,7 @@ class PlayedLane:
             if self._finished.is_set() or self.lost:
                 raise Unreachable("the lane has ended")
             await asyncio.sleep(1 / COMMANDS_PER_S)
-            if self._robot.answers:
+            if self._robot.answers and not self.silent:
                 return self._robot.state()
 
     async def finish(self) -> None:
@@ -273,6 +276,16 @@ async def test_what_ends_the_session_ends_the_hold() -> None:
         assert not session._commands.held
         with pytest.raises(Refused, match="taken over"):
             session.check()
+
+
+async def test_a_lane_whose_states_are_held_up_goes_on_sending() -> None:
+    """The other one says what has arrived, and may be the one whose commands are held up."""
+    robot = Robot()
+    async with driving(robot) as session:
+        lane = robot.lanes[-1]
+        lane.silent, before = True, lane.written
+        await more_commands(robot, 4 * MAX_UNACKNOWLEDGED, partial(session.hold, SPEED_MPS))
+        assert lane.written - before > 3 * MAX_UNACKNOWLEDGED
 
 
 async def test_a_lane_that_an_overloaded_robot_refuses_does_not_end_the_session() -> None:
