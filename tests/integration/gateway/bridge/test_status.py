@@ -2,6 +2,7 @@
 
 import os
 import signal
+import statistics
 import time
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,9 @@ from tests.support.promise import keeps
 from tests.support.running_gateway import running_gateway
 from tests.support.waiting import wait_until
 
+STATUSES = 2000
+"""Of 400 the 99th percentile is the fifth slowest, and exceeded 1.5 once in twelve times by chance."""
+UNHELD = {"requests_per_s": 10_000, "burst": 10_000, "caller_requests_per_s": 10_000}
 QUICK = {"startup_grace_ms": 0, "clear_after_ms": 0, "hub_offline_s": 0}
 CONNECTED, UNREACHABLE = cloud_pb2.CLOUD_STATE_CONNECTED, cloud_pb2.CLOUD_STATE_UNREACHABLE
 
@@ -79,6 +83,7 @@ def test_a_bridge_that_comes_back_is_reached_again(tmp_path: Path) -> None:
 
 
 @pytest.mark.timed
+@pytest.mark.alone
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "frozen"])
 def test_a_bridge_that_dies_or_freezes_is_unreachable_within_2_5_s_and_costs_nothing(
     tmp_path: Path, how: signal.Signals
@@ -86,8 +91,8 @@ def test_a_bridge_that_dies_or_freezes_is_unreachable_within_2_5_s_and_costs_not
     socket, other = tmp_path / "bridge.sock", tmp_path / "other"
     other.mkdir()
     with (
-        gateway_program(tmp_path, sources=[], bridge={"socket": str(socket)}) as gateway,
-        gateway_program(other, sources=[]) as reference,
+        gateway_program(tmp_path, sources=[], bridge={"socket": str(socket)}, limits=UNHELD) as gateway,
+        gateway_program(other, sources=[], limits=UNHELD) as reference,
     ):
 
         def unreachable_after_s() -> float:
@@ -106,10 +111,10 @@ def test_a_bridge_that_dies_or_freezes_is_unreachable_within_2_5_s_and_costs_not
 def p99_ratio(gateway: GatewayProgram, reference: GatewayProgram) -> float:
     """How long statuses of a gateway take, as a multiple of another's; asked in turns."""
     times: dict[int, list[float]] = {gateway.port: [], reference.port: []}
-    for _ in range(400):
+    for _ in range(STATUSES):
         for each in (gateway, reference):
             began_s = time.perf_counter()
             each.status()
             times[each.port].append(time.perf_counter() - began_s)
-    ours, theirs = (sorted(times[each.port])[395] for each in (gateway, reference))
+    ours, theirs = (statistics.quantiles(times[each.port], n=100)[98] for each in (gateway, reference))
     return ours / theirs
