@@ -15,11 +15,12 @@ from typing import Final
 from bench.product import product
 from bench.progress import log
 from bench.rows import Row
+from bench.soak.operators import come_and_go
 from bench.soak.readings import FEWEST_ROUNDS, Reading, judge
 from bench.video import product as sender
 from bench.video.camera import camera
 from bench.video.viewing import PATIENCE_S
-from console.client import GatewayClient, PreviewProfile
+from console.client import PreviewProfile
 
 MINUTES: Final = 30.0
 LATENCY_MS: Final = 20
@@ -53,7 +54,7 @@ def _preview(minutes: float) -> list[Row]:
 
 def _gateway(minutes: float) -> list[Row]:
     with tempfile.TemporaryDirectory() as workdir, product(Path(workdir)) as running:
-        readings = _readings(lambda: _come_and_go(running.target), running.gateway.pid, minutes)
+        readings = _readings(lambda: come_and_go(running.target, OPERATORS), running.gateway.pid, minutes)
     rounds = f"{OPERATORS} operators who come, read, watch, subscribe and go in {minutes:g} min"
     return judge(readings, "soak.gateway_", "the gateway", rounds)
 
@@ -79,13 +80,3 @@ def _watch_video(robot: sender.Robot, first: PreviewProfile, second: PreviewProf
         with robot.viewer() as passing:
             passing.next_frame(PATIENCE_S)
         staying.next_frame(PATIENCE_S)
-
-
-def _come_and_go(target: str) -> None:
-    """Each operator has a connection, and leaves two streams in the middle."""
-    for _ in range(OPERATORS):
-        with GatewayClient(target) as client:
-            client.status()
-            client.overlay()
-            next(client.watch_status(0.1))
-            next(client.events())

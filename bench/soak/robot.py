@@ -16,6 +16,7 @@ from typing import Final
 from bench.progress import log
 from bench.rows import Row
 from bench.soak.deployment import PASSING, STEADY, Deployment, deployment
+from bench.soak.operators import come_and_go
 from bench.soak.readings import FEWEST_ROUNDS, Reading, judge_together
 from console.client import AsyncGatewayClient, GatewayClient, GatewayError, PreviewProfile, PreviewState
 from console.receiver.errors import StreamError
@@ -66,19 +67,9 @@ def one_round(robot: Deployment, profile: PreviewProfile, fault: "Fault") -> Non
         AssertionError: something that had to happen did not.
     """
     with GatewayClient(robot.target) as client, fault(robot, client):
-        _come_and_go(robot.target)
+        come_and_go(robot.target, OPERATORS)
         _watch(robot, client, profile)
         asyncio.run(_drive_and_record(robot))
-
-
-def _come_and_go(target: str) -> None:
-    """Each operator has a connection, and leaves two streams in the middle."""
-    for _ in range(OPERATORS):
-        with GatewayClient(target) as client:
-            client.status()
-            client.overlay()
-            next(client.watch_status(0.1))
-            next(client.events())
 
 
 def _watch(robot: Deployment, client: GatewayClient, profile: PreviewProfile) -> None:
