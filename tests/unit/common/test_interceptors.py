@@ -69,23 +69,29 @@ BEHAVIORS: dict[str, Any] = {
 }
 
 
-async def called(chain: Chain, kind: str, *requests: bytes) -> list[bytes]:
-    """What a caller gets over a real connection."""
-    make, name = KINDS[kind]
+@asynccontextmanager
+async def served(chain: Chain, handlers: dict[str, "grpc.RpcMethodHandler[Any, Any]"]) -> AsyncIterator[Any]:
+    """A real connection to a server of test.Service with these methods."""
     server = new_server(chain)
-    handlers: dict[str, grpc.RpcMethodHandler[bytes, bytes]] = {kind: make(BEHAVIORS[kind])}
     server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("test.Service", handlers),))
     port = server.add_insecure_port("127.0.0.1:0")
     await server.start()
     try:
         async with grpc.aio.insecure_channel(f"127.0.0.1:{port}") as channel:
-            call: Any = getattr(channel, name)(f"/test.Service/{kind}")
-            request: Any = iter(requests) if kind in {"Requests", "Both"} else requests[0]
-            if kind in {"Unary", "Requests"}:
-                return [await call(request)]
-            return [each async for each in call(request)]
+            yield channel
     finally:
         await server.stop(None)
+
+
+async def called(chain: Chain, kind: str, *requests: bytes) -> list[bytes]:
+    """What a caller gets over a real connection."""
+    make, name = KINDS[kind]
+    async with served(chain, {kind: make(BEHAVIORS[kind])}) as channel:
+        call: Any = getattr(channel, name)(f"/test.Service/{kind}")
+        request: Any = iter(requests) if kind in {"Requests", "Both"} else requests[0]
+        if kind in {"Unary", "Requests"}:
+            return [await call(request)]
+        return [each async for each in call(request)]
 
 
 async def test_hooks_run_in_order_and_may_replace_requests() -> None:
@@ -114,20 +120,12 @@ async def test_a_caller_that_leaves_a_stream_of_requests_has_not_finished_it(kin
             ended.set_result(error)
 
     make, name = KINDS[kind]
-    server = new_server(Chain([ErrorInterceptor(), Ending()]))
-    handlers: dict[str, grpc.RpcMethodHandler[Any, Any]] = {kind: make(BEHAVIORS[kind])}
-    server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("test.Service", handlers),))
-    port = server.add_insecure_port("127.0.0.1:0")
-    await server.start()
-    try:
-        async with grpc.aio.insecure_channel(f"127.0.0.1:{port}") as channel:
-            call: Any = getattr(channel, name)(f"/test.Service/{kind}")()
-            await call.write(b"1")
-            call.cancel()
-            error = await asyncio.wait_for(ended, 10)
-            assert isinstance(error, asyncio.CancelledError), repr(error)
-    finally:
-        await server.stop(None)
+    async with served(Chain([ErrorInterceptor(), Ending()]), {kind: make(BEHAVIORS[kind])}) as channel:
+        call: Any = getattr(channel, name)(f"/test.Service/{kind}")()
+        await call.write(b"1")
+        call.cancel()
+        error = await asyncio.wait_for(ended, 10)
+        assert isinstance(error, asyncio.CancelledError), repr(error)
 
 
 class Refusing(Interceptor[Call]):
@@ -163,23 +161,13 @@ async def test_a_caller_that_leaves_while_a_response_is_on_its_way_ends_the_hand
             await asyncio.sleep(0)
             ended.set()
 
-    server = new_server(Chain([ErrorInterceptor(), Ending()]))
     handler: grpc.RpcMethodHandler[bytes, bytes] = grpc.unary_stream_rpc_method_handler(many)
-    server.add_generic_rpc_handlers(
-        (grpc.method_handlers_generic_handler("test.Service", {"Many": handler}),)
-    )
-    port = server.add_insecure_port("127.0.0.1:0")
-    await server.start()
-    try:
-        async with grpc.aio.insecure_channel(f"127.0.0.1:{port}") as channel:
-            stream: Any = channel.unary_stream("/test.Service/Many")
-            call = stream(b"")
-            await asyncio.wait_for(writing.wait(), 5)
-            await call.initial_metadata()
-            call.cancel()
-            await asyncio.wait_for(ended.wait(), 5)
-    finally:
-        await server.stop(None)
+    async with served(Chain([ErrorInterceptor(), Ending()]), {"Many": handler}) as channel:
+        call = channel.unary_stream("/test.Service/Many")(b"")
+        await asyncio.wait_for(writing.wait(), 5)
+        await call.initial_metadata()
+        call.cancel()
+        await asyncio.wait_for(ended.wait(), 5)
     assert [type(each) for each in endings] == [asyncio.CancelledError]
 
 
@@ -240,17 +228,9 @@ async def test_a_hook_that_fails_at_the_end_keeps_no_other_from_ending(
 async def withholding(chain: Chain, kind: str) -> AsyncIterator[Any]:
     """A call of a method with one request of which nothing but the headers has been sent."""
     make, _ = KINDS[kind]
-    server = new_server(chain)
-    handlers: dict[str, grpc.RpcMethodHandler[Any, Any]] = {kind: make(BEHAVIORS[kind])}
-    server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("test.Service", handlers),))
-    port = server.add_insecure_port("127.0.0.1:0")
-    await server.start()
-    try:
-        async with grpc.aio.insecure_channel(f"127.0.0.1:{port}") as channel:
-            method: Any = channel.stream_unary if kind == "Unary" else channel.stream_stream
-            yield method(f"/test.Service/{kind}")()
-    finally:
-        await server.stop(None)
+    async with served(chain, {kind: make(BEHAVIORS[kind])}) as channel:
+        method: Any = channel.stream_unary if kind == "Unary" else channel.stream_stream
+        yield method(f"/test.Service/{kind}")()
 
 
 @pytest.mark.parametrize("kind", ["Unary", "Responses"])
