@@ -5,30 +5,18 @@ equals its default before anything is checked; True == 1 in Python, so no check 
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from types import UnionType
 from typing import Annotated, Any, Final, Union, get_args, get_origin
 
 from pydantic import BaseModel
 
+from common.config_problems import Problem
+
 _ANY: Final = (Any, object)
 
 
-@dataclass(frozen=True, slots=True)
-class Misfit:
-    """A value that its key does not take.
-
-    Attributes:
-        location: the keys and list positions that lead to it.
-        text: which key, what is there, what is expected.
-    """
-
-    location: tuple[int | str, ...]
-    text: str
-
-
-def misfits(settings_type: type[BaseModel], values: Mapping[str, Any]) -> Iterator[Misfit]:
-    """Yields those of a configuration, the first one first.
+def misfits(settings_type: type[BaseModel], values: Mapping[str, Any]) -> Iterator[Problem]:
+    """Yields the values of a configuration that their keys do not take, the first one first.
 
     Args:
         settings_type: the model that they are for.
@@ -37,7 +25,7 @@ def misfits(settings_type: type[BaseModel], values: Mapping[str, Any]) -> Iterat
     return _misfits((settings_type,), values, ())
 
 
-def _misfits(kinds: tuple[Any, ...], value: Any, location: tuple[int | str, ...]) -> Iterator[Misfit]:
+def _misfits(kinds: tuple[Any, ...], value: Any, location: tuple[int | str, ...]) -> Iterator[Problem]:
     kinds = tuple(member for kind in kinds for member in _members(kind))
     if isinstance(value, Mapping):
         for key, inner in value.items():
@@ -49,7 +37,7 @@ def _misfits(kinds: tuple[Any, ...], value: Any, location: tuple[int | str, ...]
     elif expected := _expected(kinds, value):
         shown = str(value).lower() if isinstance(value, bool) else repr(value)
         key = ".".join(map(str, location))
-        yield Misfit(location, f"key '{key}' is {shown}, expected: {expected}")
+        yield Problem(location, f"key '{key}' is {shown}, expected: {expected}")
 
 
 def _expected(kinds: tuple[Any, ...], value: Any) -> str:
