@@ -25,7 +25,6 @@ from tests.support.waiting import wait_until
 _ROOT: Final = Path(__file__).parents[2]
 _UP_WITHIN_S: Final = 60.0
 """rclpy takes seconds to import and to join the graph, many on a machine with other things to do."""
-_EXPLAINING_LINES: Final = 20
 TOPIC: Final = "/cmd_vel_keyboard"
 _TYPE: Final = "geometry_msgs/msg/TwistStamped"
 
@@ -37,16 +36,6 @@ class RunningDrive:
     process: subprocess.Popen[bytes]
     socket: Path
     log: Path
-
-    @contextmanager
-    def explaining(self) -> Iterator[None]:
-        """Adds what the program has logged to an error."""
-        try:
-            yield
-        except BaseException as error:
-            lines = self.log.read_text(encoding="utf-8").splitlines()
-            error.add_note("\n".join(["drive.log:", *lines[-_EXPLAINING_LINES:]]))
-            raise
 
 
 @contextmanager

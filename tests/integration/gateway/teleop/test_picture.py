@@ -23,6 +23,7 @@ from console.client import (
 from tests.support.driven_robot import DrivenRobot, driven_robot, in_motion, is_at_rest
 from tests.support.driver_view import Viewer, by_picture, young_picture
 from tests.support.eventually import eventually
+from tests.support.explained import explained_by
 from tests.support.promise import keeps_async
 from tests.support.running_preview import RunningPreview
 from tests.support.stalling_camera import StallingCamera
@@ -79,7 +80,7 @@ async def seen(
 ) -> AsyncIterator[tuple[AsyncGatewayClient, Viewer]]:
     """A client and a viewer that shows the robot's picture; no stop is latched."""
     scene.camera.go_on()
-    with scene.robot.drive.explaining():
+    with explained_by(scene.robot.drive.log):
         async with young_picture(scene.robot, profile) as client_and_viewer:
             yield client_and_viewer
 
