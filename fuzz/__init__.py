@@ -1,4 +1,4 @@
-"""Coverage-guided fuzzing of everything that reads what somebody else wrote.
+"""Coverage-guided fuzzing of everything that reads what comes from outside.
 
 `targets` says what is tried and what may come of it; `worker` tries each target in a process of its own;
 `__main__` is `scripts/fuzz`.

@@ -1,4 +1,4 @@
-"""What reads somebody else's bytes. A target takes bytes and returns; whatever it raises is a defect.
+"""Everything that reads bytes from outside. A target takes bytes and returns; whatever it raises is a defect.
 
 What may come of bad input (a decoder's own error, one line for people) is caught here, and nothing else.
 """
@@ -102,7 +102,7 @@ def robots_answer(data: bytes) -> None:
 
 
 def configuration(data: bytes) -> None:
-    """The configuration files of both programs. What is wrong with one is told in one line."""
+    """The configuration files of both programs. An error is one line."""
     with NamedTemporaryFile(suffix=".yaml") as file:
         file.write(data)
         file.flush()
@@ -134,13 +134,13 @@ def token(data: bytes) -> None:
 
 
 def credential_list(data: bytes) -> None:
-    """The gateway's list of credentials. What is wrong is told without a word out of it."""
+    """The gateway's list of credentials. An error quotes nothing of it."""
     with suppress(ValueError):
         parse_store(data.decode("utf-8", "replace"))
 
 
 def login(data: bytes) -> None:
-    """What an operator pastes into robotctl login. What is wrong with it is told in one line."""
+    """What an operator pastes into robotctl login. An error is one line."""
     try:
         parse_login(data.decode("utf-8", "replace"))
     except UserError as error:
@@ -148,7 +148,7 @@ def login(data: bytes) -> None:
 
 
 def known_robots(data: bytes) -> None:
-    """The file of known robots. What is wrong with it is told in one line."""
+    """The file of known robots. An error is one line."""
     try:
         parse_robots_file(Path("config.toml"), data.decode("utf-8", "replace"))
     except UserError as error:

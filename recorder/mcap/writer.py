@@ -69,7 +69,7 @@ class SegmentWriter:
             for each in head:
                 self.note(each)
         except OSError:
-            # Nobody gets the object that would be abandoned, and nothing is in the file.
+            # No caller gets the object to abandon, and the file is empty.
             self.abandon()
             path.unlink(missing_ok=True)
             raise

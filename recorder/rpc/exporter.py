@@ -114,7 +114,7 @@ class Exporter:
         size, sha256 = exported.file.size, exported.sha256
         header = pb.ExportRecordingResponse(header=pb.ExportHeader(size=size, sha256=sha256))
         pace = Pace(request.max_bytes_per_s)
-        # The limit of all exports together is kept here, whoever calls.
+        # The limit of all exports together is kept here, whichever client calls.
         key = None if self._pace.bytes_per_s else key_of(metadata(context, KEY_HEADER))
         with self._connections.expected(key) as coming:
             if coming:

@@ -13,7 +13,7 @@ from common.program import end_with
 os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 
 from demo_program.check import check
-from demo_program.ground import DEFAULT_GRPC_PORT, DEFAULT_SRT_PORT, Ground, Wishes, prepared
+from demo_program.ground import DEFAULT_GRPC_PORT, DEFAULT_SRT_PORT, Ground, Options, prepared
 from demo_program.interruption import Interruption
 from demo_program.programs import Programs, ProgramTroubleError
 from demo_program.show import show
@@ -22,10 +22,10 @@ from demo_program.sources import parse_source
 
 def main() -> int:
     """Ends 0, or 1 with a reason and the end of each log."""
-    wishes, is_check = _command_line()
+    options, is_check = _command_line()
     interruption = Interruption()
     try:
-        with prepared(wishes) as ground:
+        with prepared(options) as ground:
             try:
                 with Programs(ground, interruption) as programs:
                     (check if is_check else show)(ground, programs, _began_s())
@@ -64,7 +64,7 @@ def _began_s() -> float:
     return time.monotonic() - (time.time() - float(began) if began else 0.0)
 
 
-def _command_line() -> tuple[Wishes, bool]:
+def _command_line() -> tuple[Options, bool]:
     parser = argparse.ArgumentParser(
         prog="scripts/demo",
         description="Simulated robot, gateway, preview and robot-drive on this machine, until Ctrl-C.",
@@ -81,14 +81,14 @@ def _command_line() -> tuple[Wishes, bool]:
         "--grpc-port", type=_port, help=f"the gateway's TCP port ({DEFAULT_GRPC_PORT}; {free})"
     )
     parser.add_argument("--srt-port", type=_port, help=f"the stream's UDP port ({DEFAULT_SRT_PORT}; {free})")
-    parser.add_argument("--domain", type=_domain, help="the ROS domain (one that nobody uses)")
+    parser.add_argument("--domain", type=_domain, help="the ROS domain (one that nothing uses)")
     arguments = parser.parse_args()
     try:
         source = parse_source(arguments.source, Path.cwd())
     except UserError as error:
         parser.error(str(error))
-    wishes = Wishes(source, arguments.grpc_port, arguments.srt_port, arguments.domain, arguments.check)
-    return wishes, arguments.check
+    options = Options(source, arguments.grpc_port, arguments.srt_port, arguments.domain, arguments.check)
+    return options, arguments.check
 
 
 def _port(text: str) -> int:

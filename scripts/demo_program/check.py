@@ -37,7 +37,7 @@ _SEEN_WITHIN_S: Final = 10.0
 _PREVIEW_WITHIN_S: Final = 20.0
 _FIRST_FRAME_WITHIN_S: Final = 15.0
 _FRAME_WITHIN_S: Final = 3.0
-# libsrt gives a port back 3 to 5 s after its listener was closed, as measured, whoever was connected.
+# libsrt gives a port back 3 to 5 s after its listener was closed, as measured, whichever peer was connected.
 _FREE_WITHIN_S: Final = 15.0
 
 Say = Callable[[str], None]

@@ -32,8 +32,8 @@ _FOREIGN: Final = (
 
 
 @dataclass(frozen=True, slots=True)
-class Wishes:
-    """What the command line asks for; None: ours to choose."""
+class Options:
+    """Options of the command line; None where the demo chooses."""
 
     source: Source
     grpc_port: int | None
@@ -103,27 +103,27 @@ class Ground:
 
 
 @contextmanager
-def prepared(wishes: Wishes) -> Iterator[Ground]:
+def prepared(options: Options) -> Iterator[Ground]:
     """The ground, with configuration files; removed when the block ends, but for logs that are wanted.
 
     Raises:
         UserError: a port is taken.
     """
-    grpc_port = _port(wishes, "gRPC", wishes.grpc_port, DEFAULT_GRPC_PORT, socket.SOCK_STREAM)
-    srt_port = _port(wishes, "SRT", wishes.srt_port, DEFAULT_SRT_PORT, socket.SOCK_DGRAM)
-    domain_held = free_domain() if wishes.domain is None else nullcontext(wishes.domain)
+    grpc_port = _port(options, "gRPC", options.grpc_port, DEFAULT_GRPC_PORT, socket.SOCK_STREAM)
+    srt_port = _port(options, "SRT", options.srt_port, DEFAULT_SRT_PORT, socket.SOCK_DGRAM)
+    domain_held = free_domain() if options.domain is None else nullcontext(options.domain)
     with domain_held as domain:
         directory = Path(tempfile.mkdtemp(prefix="robot-gateway-demo-"))
         ground = Ground(directory, grpc_port, srt_port, domain)
         try:
-            _write_configurations(ground, wishes.source)
+            _write_configurations(ground, options.source)
             yield ground
         finally:
             _clear(ground)
 
 
-def _port(wishes: Wishes, what: str, given: int | None, usual: int, kind: socket.SocketKind) -> int:
-    if given is None and wishes.any_free_port:
+def _port(options: Options, what: str, given: int | None, usual: int, kind: socket.SocketKind) -> int:
+    if given is None and options.any_free_port:
         return free_port(kind)
     port = given or usual
     if port_is_free(kind, port):
