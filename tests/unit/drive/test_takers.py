@@ -66,6 +66,24 @@ def test_an_observer_that_is_listed_before_it_is_matched_changes_nothing(graph: 
         assert graph.problems() == []
 
 
+def test_a_base_that_is_listed_before_it_is_matched_takes_nothing(graph: Graph) -> None:
+    """The defect: a recorder that was matched earlier counted in its place."""
+    graph.names[OUTPUT] = ["recorder", "mux"]
+    assert graph.problems() == [NOTHING]
+    graph.taking = 2
+    assert graph.problems() == []
+
+
+def test_an_observer_that_leaves_changes_nothing(graph: Graph) -> None:
+    graph.names[OUTPUT], graph.taking = ["recorder", "mux"], 2
+    assert graph.problems() == []
+    graph.taking = 1
+    assert graph.problems() == [], "it is still listed"
+    graph.names[OUTPUT] = ["mux"]
+    for _ in range(100):
+        assert graph.problems() == []
+
+
 def test_what_is_listed_and_not_matched_takes_nothing(graph: Graph) -> None:
     graph.taking = 0
     assert graph.problems() == [NOTHING]
