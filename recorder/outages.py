@@ -1,6 +1,7 @@
 """When the ring was not written: what snapshots lack. Pure; instants are calendar ns."""
 
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Final
 
@@ -21,10 +22,19 @@ class Outages:
         """Whether there is, or was, any."""
         return bool(self._present or self._past)
 
+    @property
+    def lasts(self) -> bool:
+        """Whether there is one at present."""
+        return self._present is not None
+
     def begin(self, cause: GapCause, at_ns: int) -> None:
         """Takes note that nothing is written from an instant on; one that lasts already goes on."""
         if self._present is None:
             self._present = Gap("", cause, at_ns, at_ns, None)
+
+    def add(self, outages: Iterable[Gap]) -> None:
+        """Takes note of some that have ended."""
+        self._past.extend(outages)
 
     def end(self, now_ns: int) -> None:
         """Takes note that it is written again, if it was not."""
@@ -35,11 +45,16 @@ class Outages:
     def within(self, from_ns: int, until_ns: int, now_ns: int) -> tuple[Gap, ...]:
         """Returns the parts of outages that lie between two instants; one that lasts is taken as of now."""
         present = (_until(self._present, now_ns),) if self._present else ()
-        return tuple(
-            replace(each, began_ns=max(each.began_ns, from_ns), ended_ns=min(each.ended_ns, until_ns))
-            for each in (*self._past, *present)
-            if each.began_ns < until_ns and each.ended_ns > from_ns
-        )
+        return parts_within((*self._past, *present), from_ns, until_ns)
+
+
+def parts_within(gaps: Iterable[Gap], from_ns: int, until_ns: int) -> tuple[Gap, ...]:
+    """Returns the parts of gaps that lie between two instants."""
+    return tuple(
+        replace(each, began_ns=max(each.began_ns, from_ns), ended_ns=min(each.ended_ns, until_ns))
+        for each in gaps
+        if each.began_ns < until_ns and each.ended_ns > from_ns
+    )
 
 
 def _until(outage: Gap, now_ns: int) -> Gap:

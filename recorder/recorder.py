@@ -149,8 +149,7 @@ class Recorder:
                 parts.segments.load()
             except OSError as error:  # It is opened, and tried again, apart from the recordings.
                 _log.error("what was left of the ring can't be read: %s", error)
-        ring = parts.segments.segments if parts.segments else ()
-        return salvage(parts.catalogue, ring, parts.boot_id)
+        return salvage(parts.catalogue, parts.segments, parts.boot_id)
 
     def _take_reserve(self) -> None:
         """Shows whether the disk can be written. A full one can: a recording that begins makes room."""

@@ -101,7 +101,7 @@ def _complete(root: Path) -> None:
         ring = Ring(root / _RING, 0)
         if ring.directory.is_dir():
             ring.load()
-        salvage(catalogue, ring.segments, boot_id="")
+        salvage(catalogue, ring, boot_id="")
     except OSError as error:
         raise UserError(
             f"the recordings in {root} can't be completed: {error}", "Check the disk, and its free space"

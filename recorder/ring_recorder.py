@@ -149,7 +149,10 @@ class RingRecorder:
             await self._link(segment)
         if not self._outages.known and self._ring.newest_ns:
             # A former process has left it.
+            self._outages.add(self._ring.losses())
             self._outages.begin(GapCause.INTERRUPTED, self._ring.newest_ns)
+        if self._outages.lasts:
+            self._ring.skip()
         output = Output(self.shape(), self._writer.head, closed)
         await asyncio.wrap_future(self._writer.add(output))
         self._outputs.ring = output

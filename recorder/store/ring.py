@@ -8,17 +8,18 @@ import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
 from common.private_files import sync_directory
 from recorder.mcap.reading import summarise
 from recorder.mcap.records import PART
-from recorder.mcap.recovery import recover
+from recorder.mcap.recovery import is_untouched, recover
 from recorder.store.folder import COPY, files_named, make_directory, segment_name
 from recorder.store.manifest import Manifest
 from recorder.store.room import is_full
-from recorder.values import SegmentSummary
+from recorder.values import Gap, GapCause, SegmentSummary
 
 _log = logging.getLogger(__name__)
 
@@ -75,6 +76,8 @@ class Ring:
         self._loaded_ns = 0
         self._left = 0
         """Segments with lower numbers are of a former process."""
+        self._damaged: set[int] = set()
+        """Numbers of segments that lack messages, or all of them."""
         self.segments: list[RingSegment] = []
 
     @property
@@ -94,13 +97,13 @@ class Ring:
         return f"{number:08d}.mcap"
 
     def load(self) -> None:
-        """Finds the segments that a former process has left.
+        """Finds the segments that a former process has left; damaged ones are made whole as cut off ones are.
 
         Raises:
-            OSError: the directory can't be read or written.
+            OSError: the directory can't be read or written, or the disk is full.
         """
         make_directory(self.directory)
-        self.segments = []
+        self.segments, self._damaged = [], set()
         for path in files_named(self.directory, _NAME):
             self._take(path, summarise)
         self.recover()
@@ -116,6 +119,26 @@ class Ring:
         found = [self._take(path, recover) for path in files_named(self.directory, _NAME, PART)]
         self.segments.sort(key=lambda each: each.number)
         return [segment for segment in found if segment]
+
+    def losses(self) -> tuple[Gap, ...]:
+        """Returns a gap wherever a segment does not follow the one before, from message to message.
+
+        A number is missing where the ring was not written (`skip`), and where a segment was damaged beyond
+        use. What the newest one has lost is part of the time since; without the oldest the ring reaches back
+        less far.
+        """
+        gaps = []
+        for one, following in pairwise(self.segments):
+            damaged = self._damaged.intersection(range(one.number, following.number))
+            if damaged or following.number > one.number + 1:
+                cause = GapCause.DISK if damaged else GapCause.INTERRUPTED
+                began_ns, ended_ns = one.summary.last_ns or 0, following.summary.first_ns or 0
+                gaps.append(Gap("", cause, began_ns, max(began_ns, ended_ns), None))
+        return tuple(gaps)
+
+    def skip(self) -> None:
+        """Leaves a number out: the next process, too, knows that the ring was not written meanwhile."""
+        self._next_number += 1
 
     def add(self, segment: RingSegment) -> None:
         """Takes a segment that has become final."""
@@ -169,11 +192,13 @@ class Ring:
         try:
             summary = summary_of(path)
             if summary is None or summary.first_ns is None or summary.last_ns is None:
-                path.unlink(missing_ok=True)  # Without a message, or damaged beyond use.
+                self._clear_away(path, number, damaged=summary is None)
                 return None
         except OSError as error:
             if is_full(error):
                 raise
+            if not isinstance(error, FileExistsError):  # That one is there under its final name.
+                self._damaged.add(number)
             _log.warning("%s can't be read and is left out of the ring: %s", path, error.strerror or error)
             return None
         # Its instants are known by the calendar clock alone: of the future where that was set back since.
@@ -182,6 +207,21 @@ class Ring:
         segment = RingSegment(number, began_ns, ended_ns, offset_ns, summary)
         self.segments.append(segment)
         return segment
+
+    def _clear_away(self, path: Path, number: int, *, damaged: bool) -> None:
+        """Deletes a segment without a message; reopens a final one that is damaged, for `recover`."""
+        part = path.with_name(f"{self.name(number)}{PART}")
+        if not damaged:
+            path.unlink(missing_ok=True)
+        elif path == part:
+            if not is_untouched(part):
+                self._damaged.add(number)
+                _log.warning("%s is damaged beyond use and is deleted; snapshots have a gap for it", part)
+            part.unlink(missing_ok=True)
+        else:
+            self._damaged.add(number)
+            _log.warning("%s is damaged: what is left of it is made whole", path)
+            path.replace(part)
 
 
 def has_segments(folder: Path) -> bool:

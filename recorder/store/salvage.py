@@ -2,7 +2,6 @@
 
 import logging
 import time
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -10,10 +9,11 @@ from typing import Final
 from recorder.mcap.records import PART
 from recorder.mcap.recovery import is_untouched, recover
 from recorder.mcap.rosbag2 import metadata
+from recorder.outages import parts_within
 from recorder.store.catalogue import Catalogue, readable, segments_in
 from recorder.store.folder import DATA, METADATA, put_aside, replace_file
 from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason, file_of
-from recorder.store.ring import RingSegment, link_next
+from recorder.store.ring import Ring, link_next
 from recorder.store.room import is_full
 from recorder.values import Gap, GapCause
 
@@ -86,12 +86,12 @@ def ended(folder: Path, manifest: Manifest, state: RecordingState, reason: StopR
     return done.model_copy(update={"metadata": file_of(METADATA, text)})
 
 
-def salvage(catalogue: Catalogue, ring: Iterable[RingSegment], boot_id: str) -> Manifest | None:
+def salvage(catalogue: Catalogue, ring: Ring | None, boot_id: str) -> Manifest | None:
     """Makes every recording whole that a former process has left open.
 
     Args:
         catalogue: as loaded.
-        ring: what was left of the ring.
+        ring: as loaded; None without one.
         boot_id: of the computer now.
 
     Returns:
@@ -101,10 +101,9 @@ def salvage(catalogue: Catalogue, ring: Iterable[RingSegment], boot_id: str) -> 
         OSError: the disk is full. One that fails in another way costs the recordings alone that it fails.
     """
     goes_on: Manifest | None = None
-    segments = list(ring)
     for manifest in sorted(catalogue.all.values(), key=lambda each: each.id):
         try:
-            running = _salvaged(catalogue, manifest, segments, boot_id)
+            running = _salvaged(catalogue, manifest, ring, boot_id)
             if running and goes_on:
                 _interrupted(catalogue, goes_on)
             goes_on = running or goes_on
@@ -115,15 +114,13 @@ def salvage(catalogue: Catalogue, ring: Iterable[RingSegment], boot_id: str) -> 
     return goes_on
 
 
-def _salvaged(
-    catalogue: Catalogue, manifest: Manifest, ring: list[RingSegment], boot_id: str
-) -> Manifest | None:
+def _salvaged(catalogue: Catalogue, manifest: Manifest, ring: Ring | None, boot_id: str) -> Manifest | None:
     """Makes one recording whole, and returns it if it is to go on."""
     folder = catalogue.folder_of(manifest)
     if not manifest.state.open and not segments_in(folder, PART):
         return None
     found = whole(folder, manifest)
-    if manifest.window_ns:
+    if manifest.window_ns and ring:
         found = _with_ring(folder, found, ring)
     running = manifest.state is RecordingState.RECORDING and manifest.kind is Kind.MANUAL
     if running and manifest.boot_id == boot_id and boot_id:
@@ -178,13 +175,15 @@ def _until_next_messages(manifest: Manifest) -> Manifest:
     return manifest.model_copy(update={"gaps": tuple(gaps)})
 
 
-def _with_ring(folder: Path, manifest: Manifest, ring: list[RingSegment]) -> Manifest:
-    """Returns a snapshot's manifest with what its window has in the ring, linked."""
-    assert manifest.window_ns, "only snapshots have one"  # noqa: S101  # the caller has looked
+def _with_ring(folder: Path, manifest: Manifest, ring: Ring) -> Manifest:
+    """Returns a snapshot's manifest with what its window has in the ring, linked, and gaps of the ring's."""
+    window = manifest.window_ns
+    assert window, "only snapshots have one"  # noqa: S101  # the caller has looked
     offset_ns = time.monotonic_ns() - time.time_ns()
-    from_ns, until_ns = (instant + offset_ns for instant in manifest.window_ns)
+    from_ns, until_ns = (instant + offset_ns for instant in window)
     known = {segment.sha256 for segment in manifest.segments}
-    for segment in ring:
-        if segment.overlaps(from_ns, until_ns) and segment.summary.sha256 not in known:
+    for segment in ring.within(from_ns, until_ns):
+        if segment.summary.sha256 not in known:
             manifest = link_next(folder, manifest, segment)
-    return manifest
+    lost = parts_within(ring.losses(), *window)
+    return manifest.model_copy(update={"gaps": (*manifest.gaps, *lost)})

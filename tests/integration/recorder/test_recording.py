@@ -167,6 +167,44 @@ async def test_a_segment_that_the_disk_refuses_a_snapshot_is_a_gap_of_it(
         assert {gap.cause for gap in done.gaps} == {GapCause.DISK}
 
 
+async def test_a_ring_that_the_disk_has_damaged_is_a_gap_of_the_next_snapshot(tmp_path: Path) -> None:
+    for _ in range(3):
+        async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
+            await running.until(lambda: running.status_reader.writes)
+            Source(running.queue).send(10)
+    damaged = sorted((tmp_path / "ring").glob("*.mcap"))[1]
+    damaged.write_bytes(bytes(damaged.stat().st_size))
+    async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
+        await running.until(lambda: running.status_reader.writes)
+        made = await running.operations.snapshot("1", SnapshotOptions(pre_s=30, post_s=0), "someone")
+        assert made.recording
+        await running.until(lambda: not running.status_reader.snapshots_pending)
+        done = running.status_reader.get(made.recording.id)
+        assert numbers(running.status_reader, done) == [*range(1, 11)] * 2
+        first, second = (each for each in done.segments if each.messages)
+        gap = next(each for each in done.gaps if each.cause is GapCause.DISK)
+        assert (gap.began_ns, gap.ended_ns) == (first.last_ns, second.first_ns)
+
+
+async def test_every_time_that_the_recorder_did_not_run_is_a_gap_of_the_next_snapshot(tmp_path: Path) -> None:
+    """The defect: only the last one was."""
+    for _ in range(3):
+        async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
+            await running.until(lambda: running.status_reader.writes)
+            Source(running.queue).send(10)
+    async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
+        await running.until(lambda: running.status_reader.writes)
+        made = await running.operations.snapshot("1", SnapshotOptions(pre_s=30, post_s=0), "someone")
+        assert made.recording
+        await running.until(lambda: not running.status_reader.snapshots_pending)
+        done = running.status_reader.get(made.recording.id)
+        full = [each for each in done.segments if each.messages]
+        assert [(gap.cause, gap.began_ns) for gap in done.gaps] == [
+            (GapCause.INTERRUPTED, each.last_ns) for each in full
+        ]
+        assert [gap.ended_ns for gap in done.gaps[:2]] == [each.first_ns for each in full[1:]]
+
+
 async def test_what_has_ended_last_is_no_question_of_the_calendar(tmp_path: Path) -> None:
     """Which the gateway makes events of: the clock may have been set back since the others ended."""
     in_an_hour_ms = time.time_ns() // 1_000_000 + 3_600_000

@@ -10,6 +10,7 @@ import pytest
 
 from recorder.mcap.writer import SegmentWriter
 from recorder.store.ring import Ring, link
+from recorder.values import Gap, GapCause
 from tests.support.segments import string_sample
 
 NS_PER_S = 1_000_000_000
@@ -78,3 +79,76 @@ def test_what_was_left_an_hour_ago_is_kept_as_long_as_what_is_new(tmp_path: Path
     assert ring.outdated(now_ns + 59 * NS_PER_S) == []
     assert ring.outdated(now_ns + 61 * NS_PER_S) == ring.segments
     assert ring.next_number == 8
+
+
+def filled(directory: Path, number: int, chunks: int = 3) -> Path:
+    """Writes a final segment of 10 messages in each chunk, its own second after that of the one before."""
+    part = directory / f"{number:08d}.mcap.part"
+    writer = SegmentWriter(part)
+    for each in range(chunks * 10):
+        sample = string_sample(each)
+        writer.write(replace(sample, log_time_ns=sample.log_time_ns + number * NS_PER_S))
+        if each % 10 == 9:
+            writer.flush()
+    writer.finish()
+    return part.with_suffix("")
+
+
+def times_of(ring: Ring, index: int) -> tuple[int, int]:
+    """When the first and the last message of a segment were logged."""
+    summary = ring.segments[index].summary
+    assert summary.first_ns
+    assert summary.last_ns
+    return summary.first_ns, summary.last_ns
+
+
+def loaded(directory: Path) -> Ring:
+    ring = Ring(directory, seconds=60)
+    ring.load()
+    return ring
+
+
+@pytest.mark.parametrize("kept", [0.0, 0.5], ids=["nothing", "half"])
+def test_a_segment_that_was_damaged_is_made_whole_and_what_it_lacks_is_known(
+    tmp_path: Path, kept: float
+) -> None:
+    """The defect: it was deleted without a word."""
+    paths = [filled(tmp_path, number) for number in range(3)]
+    assert loaded(tmp_path).losses() == ()
+    size = paths[1].stat().st_size
+    with paths[1].open("r+b") as file:
+        file.seek(round(kept * size))
+        file.write(b"\xff" * (size - round(kept * size)))
+    ring = loaded(tmp_path)
+    numbers = [each.number for each in ring.segments]
+    assert numbers == ([0, 1, 2] if kept else [0, 2])
+    assert paths[1].exists() == bool(kept)
+    left = sum(each.summary.messages for each in ring.segments)
+    assert left == 60 if not kept else 60 < left < 90
+    last_before_ns, first_behind_ns = times_of(ring, -2)[1], times_of(ring, -1)[0]
+    assert ring.losses() == (Gap("", GapCause.DISK, last_before_ns, first_behind_ns, None),)
+    assert not list(tmp_path.glob("*.part"))
+    if not kept:
+        gap = replace(ring.losses()[0], cause=GapCause.INTERRUPTED)
+        assert loaded(tmp_path).losses() == (gap,), "the next process knows it from the number"
+
+
+def test_what_the_newest_or_the_oldest_has_lost_is_no_gap_between_others(tmp_path: Path) -> None:
+    paths = [filled(tmp_path, number) for number in range(3)]
+    for path in (paths[0], paths[2]):
+        path.write_bytes(b"\xff" * 1000)
+    ring = loaded(tmp_path)
+    assert [each.number for each in ring.segments] == [1]
+    assert ring.next_number == 3
+    assert ring.losses() == ()
+
+
+def test_the_next_process_knows_when_the_ring_was_not_written(tmp_path: Path) -> None:
+    filled(tmp_path, 0)
+    ring = loaded(tmp_path)
+    ring.skip()
+    filled(tmp_path, ring.next_number)
+    filled(tmp_path, ring.next_number + 1)
+    ring = loaded(tmp_path)
+    assert [each.number for each in ring.segments] == [0, 2, 3]
+    assert ring.losses() == (Gap("", GapCause.INTERRUPTED, times_of(ring, 0)[1], times_of(ring, 1)[0], None),)
