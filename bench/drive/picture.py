@@ -99,7 +99,7 @@ async def _stopped_s(
     camera: StallingCamera, robot: DrivenRobot, happens: Callable[[Scene], Awaitable[None]]
 ) -> float:
     async with young_picture(robot) as (client, viewer), client.drive(by_picture(viewer)) as session:
-        await in_motion(session, robot.base, SPEED_MPS)
+        await in_motion(client, session, robot.base, SPEED_MPS)
         await asyncio.gather(happens(Scene(camera, robot, client, viewer)), _hold(session))
         return robot.base.stopped_after_s(viewer.shown_ns / 1e9)
 

@@ -59,7 +59,7 @@ async def _moved_s(gateway: Guarded, base: Base, driver: Credentials, credential
             AsyncGatewayClient(gateway.target, credentials=driver) as client,
             client.drive(BY_EYE) as session,
         ):
-            await in_motion(session, base, SPEED_MPS)
+            await in_motion(client, session, base, SPEED_MPS)
             began_s = time.monotonic()
             gateway.admin.revoke(credential_id)
             while time.monotonic() < began_s + HOLDS_S:

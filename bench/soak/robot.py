@@ -92,7 +92,7 @@ async def _drive_and_record(robot: Deployment) -> None:
     async with AsyncGatewayClient(robot.target) as client:
         made = (await client.start_recording("soak")).recording
         async with client.drive(BY_EYE) as session:
-            await in_motion(session, robot.base, SPEED_MPS)
+            await in_motion(client, session, robot.base, SPEED_MPS)
             session.release()
             await eventually(lambda: is_at_rest(robot.base), bool, "the base is at rest")
         await client.stop_recording(made.id)

@@ -3,7 +3,7 @@
 import asyncio
 import time
 from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager, contextmanager
+from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,6 @@ from console.client import (
     DrivePhase,
     DriveSession,
     GatewayError,
-    Refused,
     Supervision,
 )
 from drive.config import DriveSettings
@@ -29,6 +28,9 @@ from tests.support.waiting import wait_until
 REST_S = 0.3
 """Longer than any message takes that is on its way."""
 _HOLD_EVERY_S = 0.02
+LOST_BY = "robot-drive"
+"""Who stops a robot whose worker was lost."""
+_IN_MOTION_WITHIN_S = 30.0
 _ATTEMPT = 100
 """Holds without motion, each 10 ms or more, after which the driver releases and holds anew."""
 BY_EYE = DriveOptions(supervision=Supervision.LINE_OF_SIGHT, input_device="test")
@@ -101,20 +103,45 @@ def driven_robot(
         yield robot
 
 
-async def in_motion(session: DriveSession, base: Base, speed_mps: float) -> None:
-    """Holds anew until base and driver have motion; a busy machine may take several attempts."""
+async def in_motion(client: AsyncGatewayClient, session: DriveSession, base: Base, speed_mps: float) -> None:
+    """Holds anew until base and driver have motion; a busy machine may take several attempts.
+
+    A machine that delays the drive program's worker has it replaced, which leaves a stop: that is reset. The
+    session goes on.
+
+    Args:
+        client: of an operator.
+        session: its hold, or another operator's.
+        base: what moves.
+        speed_mps: straight ahead.
+    """
     attempts = 0
 
     async def moves() -> bool:
         nonlocal attempts
         if attempts % _ATTEMPT == 0:
             session.release()
+            await _reset_after_a_loss(client)
             await session.ready(within_s=15)
         attempts += 1
         session.hold(speed_mps)
         return base.moves and session.state is not None and session.state.phase is DrivePhase.DRIVING
 
-    await eventually(moves, bool, "the base moves, and the driver knows")
+    await eventually(moves, bool, "the base moves, and the driver knows", _IN_MOTION_WITHIN_S)
+
+
+async def _reset_after_a_loss(client: AsyncGatewayClient) -> None:
+    """Resets a stop that the drive program has made itself; one of a caller stays."""
+
+    async def is_reset() -> bool:
+        stop = (await client.status()).teleop.stop
+        if stop is None or stop.by != LOST_BY:
+            return True
+        with suppress(GatewayError):  # It is not known yet what else commands the robot.
+            await client.reset_stop(stop.stop_id)
+        return False
+
+    await eventually(is_reset, bool, "the stop is reset that a lost worker has left", _IN_MOTION_WITHIN_S)
 
 
 @asynccontextmanager
@@ -176,7 +203,7 @@ async def stop_by(
     async def is_reset() -> bool:
         try:
             await operator.reset_stop(stopped.stop.stop_id)
-        except Refused:  # It is not known yet what else commands the robot.
+        except GatewayError:  # It is not known yet what else commands the robot, or its worker is replaced.
             return False
         return True
 

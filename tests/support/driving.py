@@ -247,7 +247,7 @@ class Driving:
         wait_until(self.observer.state, "a worker that serves", 30)
         peer = self.connect()
         wait_until(self._available, "nobody drives, and no stop is latched", 30)
-        return peer
+        return self.peer or peer
 
     def drive(self, vx: float = 0.1) -> Peer:
         """Drives; the base moves when this returns.
@@ -291,7 +291,9 @@ class Driving:
     def _available(self) -> bool:
         state = self.state()
         if self.peer and state.HasField("stop"):
-            self.peer.send(reset=state.stop.stop_id)
+            with suppress(BrokenPipeError):
+                peer = self.connect() if self.peer.gone else self.peer
+                peer.send(reset=state.stop.stop_id)
         return state.phase == pb.PHASE_AVAILABLE
 
     def _armed(self) -> bool:

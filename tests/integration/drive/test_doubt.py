@@ -93,8 +93,8 @@ def test_another_source_of_higher_priority_stops_us(robot: Driving) -> None:
     robot.drive()
     robot.robot.change(commander="unseen", speed_mps=0.2)
     try:
-        state = robot.phase_is("INHIBITED")
-        assert list(state.inhibits) == [pb.INHIBIT_OUTRANKED]
+        robot.phase_is("INHIBITED")
+        wait_until(lambda: list(robot.state().inhibits) == [pb.INHIBIT_OUTRANKED], "it is outranked")
     finally:
         robot.robot.change(commander="nobody")
     robot.settled()
@@ -106,10 +106,9 @@ def test_without_a_base_nothing_is_driven(tmp_path: Path, ros_domain: int) -> No
         robot.robot.process.terminate()
         state = robot.phase_is("INHIBITED")
         assert set(state.inhibits) & {pb.INHIBIT_BASE_ABSENT, pb.INHIBIT_OUTRANKED}
-        state = wait_until(
-            lambda: state if pb.INHIBIT_BASE_ABSENT in (state := robot.state()).inhibits else None, "no base"
-        )
-        assert "nothing takes the velocities on /cmd_vel_keyboard" in state.problems
+        wait_until(lambda: pb.INHIBIT_BASE_ABSENT in robot.state().inhibits, "no base")
+        missing = "nothing takes the velocities on /cmd_vel_keyboard"
+        wait_until(lambda: missing in robot.state().problems, missing)
 
 
 def test_a_recorder_of_our_own_is_no_base(tmp_path: Path, ros_domain: int) -> None:  # noqa: ARG001

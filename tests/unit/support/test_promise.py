@@ -45,9 +45,7 @@ def test_a_figure_at_the_promise_is_within_it() -> None:
 
 def test_a_figure_beyond_it_fails_at_once_on_a_free_machine(attempts: Attempts) -> None:
     attempts.loads += [FREE]
-    with pytest.raises(
-        pytest.fail.Exception, match=r"s until: 2.1, promised 2; .* 59% of .* 0.00 s"
-    ):
+    with pytest.raises(pytest.fail.Exception, match=r"s until: 2.1, promised 2; .* 59% of .* 0.00 s"):
         keeps(2.0, "s until", lambda: 2.1)
 
 

@@ -33,7 +33,7 @@ def held_by(target: str, login: Credentials, base: Base) -> Iterator[None]:
 
     async def drive() -> None:
         async with AsyncGatewayClient(target, credentials=login) as client, client.drive(BY_EYE) as session:
-            await in_motion(session, base, SPEED_MPS)
+            await in_motion(client, session, base, SPEED_MPS)
             async with held(session, SPEED_MPS):
                 moving.set()
                 await asyncio.to_thread(ending.wait, _ENDS_WITHIN_S)

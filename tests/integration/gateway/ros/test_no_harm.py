@@ -12,6 +12,7 @@ import psutil
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
+from common import ros_transport
 from gateway.config import DEFAULT_SOURCES
 from gateway.ros.intake import intake
 from gateway.status.board import Board
@@ -89,8 +90,12 @@ def test_a_flood_of_detections_starves_neither_sources_nor_operators(tmp_path: P
 
 
 @pytest.mark.usefixtures("ros_domain")
-def test_a_flood_is_read_at_the_samplers_pace() -> None:
-    """Five thousand objects are counted, a hundred are decoded: the source need not rest."""
+def test_a_flood_is_read_at_the_samplers_pace(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Five thousand objects are counted, a hundred are decoded: the source need not rest.
+
+    Through shared memory: of pictures of a megabyte UDP loses as many as its buffers have no room for.
+    """
+    monkeypatch.delenv(ros_transport.VARIABLE)
     board = Board()
     detections = [source for source in DEFAULT_SOURCES if source.name == "detections"]
     with intake(detections, board) as running, helper("tests.support.flood", "5000", "30") as flood:

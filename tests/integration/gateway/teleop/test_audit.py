@@ -67,7 +67,7 @@ async def test_who_drove_who_stopped_and_who_was_refused(
 
         await eventually(enabled, bool, "driving is enabled")
         async with driver.drive(BY_EYE) as session:
-            await in_motion(session, base, SPEED_MPS)
+            await in_motion(driver, session, base, SPEED_MPS)
             stopped = await viewer.stop_robot("a child on the track")
             with pytest.raises(NotAllowed):
                 await viewer.reset_stop(stopped.stop.stop_id)
@@ -81,7 +81,7 @@ async def test_who_drove_who_stopped_and_who_was_refused(
                 return True
 
             await eventually(reset, bool, "the stop is reset")
-            await in_motion(session, base, SPEED_MPS)
+            await in_motion(driver, session, base, SPEED_MPS)
             robot.admin.revoke(anna_id)
 
             await eventually(lambda: has_ended(session), bool, "the driver's access has ended")
@@ -117,7 +117,7 @@ async def test_a_motion_that_a_killed_gateway_left_is_recorded_by_the_next(
             async with AsyncGatewayClient(robot.target, credentials=anna) as driver:
                 with suppress(GatewayError):
                     async with driver.drive(BY_EYE) as session:
-                        await in_motion(session, base, SPEED_MPS)
+                        await in_motion(driver, session, base, SPEED_MPS)
                         os.kill(robot.pid, signal.SIGKILL)
                         await eventually(lambda: has_ended(session), bool, "the session has ended")
         assert not motions(first)

@@ -61,7 +61,7 @@ async def stopped_after_s(robot: DrivenRobot, link: TcpLink, fault: Callable[[],
     async with available(robot):
         pass
     async with AsyncGatewayClient(link.target) as client, client.drive(BY_EYE) as session:
-        await in_motion(session, robot.base, SPEED_MPS)
+        await in_motion(client, session, robot.base, SPEED_MPS)
         async with held(session, SPEED_MPS):
             began_s = time.monotonic()
             fault()
@@ -113,7 +113,7 @@ async def test_3_percent_loss_stops_nothing_and_no_old_command_passes(
             AsyncGatewayClient(link.target) as client,
             client.drive(BY_EYE) as session,
         ):
-            await in_motion(session, robot.base, SPEED_MPS)
+            await in_motion(client, session, robot.base, SPEED_MPS)
             began_s, stops = time.monotonic(), 0
             async with held(session, SPEED_MPS):
                 async for state in session.states():
@@ -148,7 +148,7 @@ async def test_blackouts_of_300_ms_end_the_motion_until_a_release(robot: DrivenR
     """TCP delivers afterwards what was sent meanwhile, all of it held."""
 
     async def blackout() -> float:
-        await in_motion(session, robot.base, SPEED_MPS)
+        await in_motion(client, session, robot.base, SPEED_MPS)
         async with held(session, SPEED_MPS):
             began_s = time.monotonic()
             link.cut()

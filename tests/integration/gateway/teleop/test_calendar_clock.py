@@ -56,7 +56,7 @@ async def test_a_step_of_an_hour_does_not_stop_the_robot(robot: DrivenRobot, clo
             AsyncGatewayClient(robot.target) as client,
             client.drive(BY_EYE) as session,
         ):
-            await in_motion(session, robot.base, SPEED_MPS)
+            await in_motion(client, session, robot.base, SPEED_MPS)
             phases = set()
             async with held(session, SPEED_MPS):
                 for step_s in STEPS_S:
@@ -84,7 +84,7 @@ async def test_a_release_after_a_step_stops_within_60_ms(
             AsyncGatewayClient(robot.target) as client,
             client.drive(BY_EYE) as session,
         ):
-            await in_motion(session, robot.base, SPEED_MPS)
+            await in_motion(client, session, robot.base, SPEED_MPS)
             async with held(session, SPEED_MPS):
                 clock.step(step_s)
                 await asyncio.sleep(STEPPED_S)

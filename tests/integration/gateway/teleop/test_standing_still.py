@@ -44,14 +44,22 @@ def robot(module_ros_domain: int, tmp_path_factory: pytest.TempPathFactory) -> I
 
 
 @pytest.fixture
-async def session(robot: DrivenRobot) -> AsyncIterator[DriveSession]:
-    async with available(robot), AsyncGatewayClient(robot.target) as client, client.drive(BY_EYE) as session:
+async def client(robot: DrivenRobot) -> AsyncIterator[AsyncGatewayClient]:
+    async with available(robot) as client:
+        yield client
+
+
+@pytest.fixture
+async def session(client: AsyncGatewayClient) -> AsyncIterator[DriveSession]:
+    async with client.drive(BY_EYE) as session:
         yield session
 
 
-async def moved_s(robot: DrivenRobot, session: DriveSession, numbers: list[signal.Signals]) -> float:
+async def moved_s(
+    robot: DrivenRobot, client: AsyncGatewayClient, session: DriveSession, numbers: list[signal.Signals]
+) -> float:
     """How long the base moves after the gateway got the first signal; the rest follow after FROZEN_S."""
-    await in_motion(session, robot.base, SPEED_MPS)
+    await in_motion(client, session, robot.base, SPEED_MPS)
     async with held(session, SPEED_MPS):
         began_s = time.monotonic()
         for number in numbers:
@@ -63,31 +71,31 @@ async def moved_s(robot: DrivenRobot, session: DriveSession, numbers: list[signa
 
 
 async def test_a_gateway_whose_loop_is_blocked_for_a_second_stops_within_280_ms(
-    robot: DrivenRobot, session: DriveSession
+    robot: DrivenRobot, client: AsyncGatewayClient, session: DriveSession
 ) -> None:
     await keeps_async(
         0.28,
         "s of motion after the gateway's loop stood still",
-        lambda: moved_s(robot, session, [signal.SIGUSR1]),
+        lambda: moved_s(robot, client, session, [signal.SIGUSR1]),
     )
 
 
 async def test_frozen_and_thawed_again_and_again_the_gateway_moves_nothing_by_old_commands(
-    robot: DrivenRobot, session: DriveSession
+    robot: DrivenRobot, client: AsyncGatewayClient, session: DriveSession
 ) -> None:
     for _ in range(TIMES):
         await keeps_async(
             0.28,
             "s of motion after the gateway was frozen",
-            lambda: moved_s(robot, session, [signal.SIGSTOP, signal.SIGCONT]),
+            lambda: moved_s(robot, client, session, [signal.SIGSTOP, signal.SIGCONT]),
         )
 
 
 async def test_a_drive_program_that_is_started_again_gets_the_lease_and_moves_only_after_a_release(
-    robot: DrivenRobot, session: DriveSession
+    robot: DrivenRobot, client: AsyncGatewayClient, session: DriveSession
 ) -> None:
     """The session goes on: DRIVE_LOST meanwhile, then the stop that the loss has left."""
-    await in_motion(session, robot.base, SPEED_MPS)
+    await in_motion(client, session, robot.base, SPEED_MPS)
     worker = psutil.Process(robot.drive.process.pid).children()[0]
     async with held(session, SPEED_MPS):
         began_s = time.monotonic()
@@ -106,7 +114,7 @@ async def test_a_drive_program_that_is_started_again_gets_the_lease_and_moves_on
     await session.ready(STARTS_WITHIN_S)
     assert session.state is not None
     assert session.state.phase is DrivePhase.ARMED, "the same session has the lease of the new process"
-    await in_motion(session, robot.base, SPEED_MPS)
+    await in_motion(client, session, robot.base, SPEED_MPS)
 
 
 async def test_a_stop_while_the_drive_program_is_away_reaches_the_next_one(robot: DrivenRobot) -> None:
