@@ -20,7 +20,7 @@ _WORDS: Final[Mapping[tuple[Side, Severity], tuple[str, str]]] = {
 def number_conditions(
     spec: SourceSpec[Number], meaning: NumberMeaning, sample: Sample[Number], faults: tuple[Fault, ...]
 ) -> Iterator[Condition]:
-    """Yields the condition of the newest number; one that is unknown or stale is judged as its fault says."""
+    """Yields the condition of the newest number, stale or not; an unknown one is judged as its fault says."""
     found = violation_of(spec, meaning, sample, faults)
     if found is None:
         return
@@ -40,7 +40,8 @@ def violation_of(
 ) -> Violation | None:
     """Returns which limit the newest value violates, with the hysteresis of the faults; None if none.
 
-    A value that is unknown or stale is judged as its fault says.
+    A stale value is the last that is known: silence neither cures nor keeps a fault. An unknown one (NaN) is
+    judged as its fault says.
     """
     before = {
         side: fault.condition.severity
@@ -48,7 +49,7 @@ def violation_of(
         for side in Side
         if fault.active and fault.condition.fault_id == _fault_id(spec, side)
     }
-    value = sample.value.value if sample.value and sample.freshness.fresh else None
+    value = sample.value.value if sample.value else None
     if value is not None:
         return meaning.violation(value, before)
     known = ((side, severity, meaning.limit(side, severity)) for side, severity in before.items())

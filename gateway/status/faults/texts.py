@@ -17,8 +17,8 @@ _LONGEST_SLUG: Final = 40
 def text_conditions(
     spec: SourceSpec[Text], meaning: TextMeaning, sample: Sample[Text], faults: tuple[Fault, ...]
 ) -> Iterator[Condition]:
-    """Yields the condition of the newest text; of one that is unknown or stale, those of its faults."""
-    text = sample.value.text if sample.value and sample.freshness.fresh else None
+    """Yields the condition of the newest text, stale or not; of one that is unknown, those of its faults."""
+    text = sample.value.text if sample.value else None
     beginning = f"{spec.name}.value."
     if text is None:
         for fault in faults:

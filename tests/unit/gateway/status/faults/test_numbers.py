@@ -49,6 +49,16 @@ class Robot:
         }
 
 
+def test_what_was_cured_before_the_silence_stays_cured() -> None:
+    """The defect: a fault that waited to be cleared when the topic fell silent stayed for ever."""
+    robot = Robot()
+    robot.reads(96.0)
+    robot.reads(60.0)
+    assert robot.active() == {"number.motor.high": Severity.ERROR}, "it is not cleared yet"
+    robot.waits(3.0)
+    assert robot.active() == {"number.motor.stale": Severity.WARNING}
+
+
 def sentences(events: list[Event]) -> list[str]:
     return [event.sentence or event.message for event in events]
 

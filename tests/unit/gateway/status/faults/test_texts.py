@@ -54,6 +54,15 @@ def test_other_texts_share_one_fault() -> None:
     assert (fault.times_raised, fault.condition.message) == (1, "Gripper: an empty text")
 
 
+def test_what_was_cured_before_the_silence_stays_cured() -> None:
+    """The defect: a fault that waited to be cleared when the topic fell silent stayed for ever."""
+    robot = Robot()
+    robot.says("jammed!")
+    robot.now_s -= 2.5  # Half a second later.
+    assert set(robot.says("open")) == {"text.gripper.value.jammed"}, "it is not cleared yet"
+    assert set(robot.waits()) == {"text.gripper.stale"}
+
+
 def test_silence_and_no_text_keep_what_was_bad() -> None:
     robot = Robot()
     robot.says("jammed!")
