@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 import typer
 
 from common.errors import ExitCode
+from common.printable import escaped, printable_lines
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
 # rich is imported late: programs that serve pass findings on, and print none.
 
@@ -76,7 +78,7 @@ def findings_json(findings: Sequence[Finding]) -> dict[str, Any]:
 def print_findings(findings: Sequence[Finding], *, as_json: bool, out: "Console") -> None:
     """Prints a JSON document, or a row per finding with consequence and remedy below it."""
     if as_json:
-        print(json.dumps(findings_json(findings), indent=2, ensure_ascii=False), file=out.file)
+        print(escaped(json.dumps(findings_json(findings), indent=2, ensure_ascii=False)), file=out.file)
         return
     from rich.text import Text  # noqa: PLC0415
 
@@ -107,9 +109,16 @@ def _table(findings: Sequence[Finding]) -> "Table":
     table.add_column(overflow="fold")
     for each in findings:
         table.add_row(
-            Text(each.verdict.value, style=_STYLES[each.verdict]), Text(each.check), Text(each.what)
+            Text(each.verdict.value, style=_STYLES[each.verdict]), _text(each.check), _text(each.what)
         )
         for label, text in (("why", each.why), ("do", each.remedy)):
             if text:
-                table.add_row("", Text(label, style="dim"), Text(text))
+                table.add_row("", Text(label, style="dim"), _text(text))
     return table
+
+
+def _text(text: str) -> "Text":
+    """Returns a cell. What a finding quotes of the graph, of a file or of another program can be anything."""
+    from rich.text import Text  # noqa: PLC0415
+
+    return Text(printable_lines(text))

@@ -1,4 +1,7 @@
-"""Logging of all programs: one line per record on standard error, as text or as JSON."""
+"""Logging of all programs: one line per record on standard error, as text or as JSON.
+
+A record may quote what comes from outside, which must not forge another line or steer a terminal.
+"""
 
 import json
 import logging
@@ -7,6 +10,7 @@ from datetime import UTC, datetime
 from typing import Final, Literal, TypeAlias
 
 from common import request_id
+from common.printable import escaped, printable, printable_lines
 
 Format: TypeAlias = Literal["human", "json"]
 
@@ -16,7 +20,7 @@ _HUMAN: Final = "%(asctime)s %(levelname)-7s %(name)s: %(message)s%(of_request)s
 def configure(level: str, form: Format = "human") -> None:
     """Sends records of at least `level` ("debug", "info", "warning", "error") to standard error."""
     handler = logging.StreamHandler(sys.stderr)
-    handler.setFormatter(_Json() if form == "json" else logging.Formatter(_HUMAN))
+    handler.setFormatter(_Json() if form == "json" else _Human(_HUMAN))
     handler.addFilter(_add_request_id)
     logging.basicConfig(level=level.upper(), handlers=[handler], force=True)
     # Debug records of asyncio and gRPC are frequent and say nothing about the robot.
@@ -29,6 +33,16 @@ def _add_request_id(record: logging.LogRecord) -> bool:
     of = request_id.current()
     record.__dict__.update(request_id=of, of_request=f" [request {of}]" if of else "")
     return True
+
+
+class _Human(logging.Formatter):
+    """Formats a record as a line of text; a traceback follows in lines of its own."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        return printable_lines(super().format(record))
+
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802  # logging's own name
+        return printable(super().formatMessage(record))
 
 
 class _Json(logging.Formatter):
@@ -45,4 +59,4 @@ class _Json(logging.Formatter):
             line["request_id"] = of_request
         if record.exc_info:
             line["exception"] = self.formatException(record.exc_info)
-        return json.dumps(line, ensure_ascii=False)
+        return escaped(json.dumps(line, ensure_ascii=False))

@@ -22,11 +22,11 @@ from common.ca import certificate_info
 from common.config import load
 from common.errors import DomainError, InvalidRequestError, UserError
 from common.metrics_endpoint import respond
+from common.printable import escaped, printable, printable_lines
 from common.request_id import begin, current
 from common.trial import TrialError, parse_result
 from console.capture_time import WRAP_TICKS
 from console.client.mapping.methods import METHODS
-from console.printable import escaped, printable, printable_lines
 from console.receiver.reorder import Reorder
 from console.receiver.transport_stream import PACKET_BYTES, TransportStream, UnknownVideoError
 from console.robots.login import parse_login

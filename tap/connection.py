@@ -41,6 +41,8 @@ REQUEST_WITHIN_S: Final = 2.0
 _POLL_S: Final = 0.1
 """How soon the end of a connection is noticed while no messages come."""
 _PROBLEM_EVERY_S: Final = 0.5
+_LOG_EVERY_S: Final = 60.0
+"""Of good and bad messages in turns, each bad one would be a line."""
 _NS_PER_S: Final = 1_000_000_000
 
 
@@ -72,6 +74,7 @@ class Connection:
         self._closing = threading.Event()
         self._permitted = False
         self._problem, self._problem_at_s = "", 0.0
+        self._log_at_s, self._unlogged = 0.0, 0
         self._refusal = ""
         """Of the newest message; empty if that was good."""
         self.topic = ""
@@ -177,8 +180,16 @@ class Connection:
             return
         self._problem, self._problem_at_s = problem, now_s + _PROBLEM_EVERY_S
         if problem:
-            _log.warning("%s", problem)
+            self._log(problem, now_s)
         self._socket.send(encode_text(Kind.PROBLEM, problem))
+
+    def _log(self, problem: str, now_s: float) -> None:
+        if now_s < self._log_at_s:
+            self._unlogged += 1
+            return
+        earlier = f" (and {self._unlogged} more times since the last line)" if self._unlogged else ""
+        _log.warning("%s%s", problem, earlier)
+        self._log_at_s, self._unlogged = now_s + _LOG_EVERY_S, 0
 
     def _take_permissions(self) -> bool:
         """Takes what the preview has sent; False when it has closed.

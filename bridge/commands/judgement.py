@@ -7,7 +7,7 @@ from typing import Final
 
 from google.protobuf.message import DecodeError
 
-from console.printable import printable
+from common.printable import printable
 from fleet.names import command_subject
 from omniseer.fleet.v1 import command_pb2 as pb
 

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from console.printable import printable
+from common.printable import printable
 
 _LONGEST_TEXT: Final = 300
 """Characters: it is part of the robot's status, and of each of its states at the hub."""

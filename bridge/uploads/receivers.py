@@ -14,7 +14,7 @@ from google.protobuf.message import DecodeError, Message
 
 from bridge.uploads.parts import LostError
 from bridge.uploads.problems import AttemptError, CutError, RecordingError
-from console.printable import printable
+from common.printable import printable
 from fleet.errors import HubError, HubReason
 from fleet.names import upload_subject
 from omniseer.fleet.v1 import upload_pb2 as pb

@@ -5,8 +5,8 @@ import sys
 from typing import Any
 
 from common.errors import ExitCode, UserError
+from common.printable import escaped
 from console.cli.typed_options import typed_options
-from console.printable import escaped
 
 
 def error_as_json(error: UserError) -> dict[str, Any]:

@@ -12,11 +12,11 @@ from typing import Any, Protocol
 import typer
 from rich.console import Console, RenderableType
 
+from common.printable import escaped
 from console.cli.options import GlobalOptions, JsonOption, RobotOption, TargetOption, json_requested
 from console.client import AsyncGatewayClient, GatewayClient
 from console.credentials import Credentials
 from console.presentation.json_form import json_form
-from console.printable import escaped
 from console.robots import Robot, choose, read_credentials, read_robots_file
 from console.target import parse_target
 

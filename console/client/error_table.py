@@ -5,10 +5,10 @@ from typing import Any, Final
 
 import grpc
 
+from common.printable import printable
 from common.reasons import Reason
 from common.refusal import refusal_in
 from console.client import errors
-from console.printable import printable
 
 ERRORS: Final[Mapping[grpc.StatusCode, type[errors.GatewayError]]] = {
     # An error with the code OK is a defect of the server.

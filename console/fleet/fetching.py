@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import ExitCode, UserError
+from common.printable import printable
 from console.client import results
 from console.client.errors import GatewayFailed, Refused, Unreachable
 from console.client.mapping.reader import read
@@ -14,7 +15,6 @@ from console.fleet.receipts import check_receipt
 from console.fleet.store import read_whole, usable
 from console.fleet.values import ReceiptCheck, Unreadable
 from console.fleet.wire import recording_of
-from console.printable import printable
 from fleet import names
 from fleet.connection import Hub
 from fleet.errors import HubError, HubReason

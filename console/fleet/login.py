@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from common.errors import ExitCode, UserError
+from common.printable import printable
 from common.private_files import write_all_private
-from console.printable import printable
 from console.robots.credentials import read_private
 from console.robots.login_text import parse_login_text
 from console.robots.robots_file import read_text, robots_file_path

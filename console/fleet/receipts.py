@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Final
 
+from common.printable import printable
 from console.fleet.values import ReceiptCheck
-from console.printable import printable
 from fleet.receipts import ReceiptFlaw, opened
 from omniseer.fleet.v1.upload_pb2 import Receipt, StoredRecording
 

@@ -3,11 +3,11 @@
 from collections.abc import Iterator
 from typing import Final
 
+from common.printable import printable
 from console.client import results
 from console.client.mapping.events import event
 from console.client.mapping.reader import read
 from console.fleet import values
-from console.printable import printable
 from fleet.enrolment import is_revoked
 from fleet.reading import (
     NotReadableError,

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 from common.errors import UserError
+from common.printable import printable
 from console.gamepad.hands import PadHands, PadInput
 from console.gamepad.sdl import SdlPad, library
 from console.gamepad.silence import SILENT, Silence
-from console.printable import printable
 from console.steering import Steering
 
 PERIOD_S: Final = 0.008

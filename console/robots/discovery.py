@@ -20,7 +20,7 @@ from zeroconf.asyncio import AsyncServiceInfo
 from common.advertisement import SERVICE_TYPE, advertisement_from
 from common.errors import ExitCode, UserError
 from common.plain_name import plain_name
-from console.printable import printable
+from common.printable import printable
 
 ADDRESSES_VARIABLE: Final = "ROBOTCTL_DISCOVERY"
 MOST_ROBOTS: Final = 64

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import ExitCode, UserError
+from common.printable import printable
 from console.credentials import Credentials
-from console.printable import printable
 from console.robots.credentials import credentials_directory
 from console.robots.login_text import parse_login_text
 from console.robots.robots_file import Robot, RobotsFile, robots_file_path

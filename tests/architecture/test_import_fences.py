@@ -205,8 +205,9 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("drive/worker.py", (*HEAVY, "drive.base")),
         *(
             (f"console/{name}.py", (*HEAVY, *WIRE, "asyncio", "typer", "rich", "console.client"))
-            for name in ("target", "credentials", "printable")
+            for name in ("target", "credentials")
         ),
+        ("common/printable.py", (*HEAVY, *WIRE, "asyncio", "typer", "rich")),
         ("console/robots/", ("console.client",)),
         ("console/client/", (*HEAVY, "common.gst", "console.receiver")),
         ("console/presentation/", (*HEAVY, *WIRE, "common.gst", "typer", "rich", "console.cli")),

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
+from common.printable import printable
 from console.client.mapping.reader import read
 from console.client.results import CaughtUp, Event, EventGap, EventKind, EventPosition, Fault
-from console.printable import printable
 from omniseer.gateway.v1 import event_pb2 as wire
 from omniseer.gateway.v1 import robot_gateway_pb2
 

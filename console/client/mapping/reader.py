@@ -19,9 +19,9 @@ from typing import Any, Final, TypeVar, cast, get_args, get_origin, get_type_hin
 from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from google.protobuf.message import Message
 
+from common.printable import printable, printable_lines
 from console.client import results
 from console.client.mapping import enums
-from console.printable import printable, printable_lines
 
 ResultT = TypeVar("ResultT")
 

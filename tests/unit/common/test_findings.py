@@ -38,6 +38,12 @@ def test_people_read_why_and_what_to_do_below_each_finding() -> None:
     assert printed(ALL[:1], as_json=False).splitlines()[-1] == "nothing is wrong"
 
 
+def test_what_a_finding_quotes_steers_no_terminal() -> None:
+    quoting = (wrong("topic.\x1b[2J", "has '\x1b]52;c;aGk=\x07\x9b'", "\u202e", "type\x07 this"),)
+    for as_json in (False, True):
+        assert all(line.isprintable() for line in printed(quoting, as_json=as_json).split("\n"))
+
+
 def test_scripts_read_the_same() -> None:
     document = json.loads(printed(ALL, as_json=True))
     assert document["ok"] is False

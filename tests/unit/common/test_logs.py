@@ -31,6 +31,17 @@ def test_a_person_reads_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert second.endswith("WARNING gateway.somewhere: asked [request shift-7]")
 
 
+@pytest.mark.parametrize("form", ["human", "json"])
+def test_what_a_record_quotes_forges_no_line_and_steers_no_terminal(
+    capsys: pytest.CaptureFixture[str], form: logs.Format
+) -> None:
+    logs.configure("info", form)
+    _log.info("encoding '%s'", "a\nERROR forged\x1b]52;c;aGk=\x07\u2028\x9b2J\u202e")
+    (line,) = capsys.readouterr().err.split("\n")[:-1]
+    assert line.isprintable()
+    assert "forged" in line
+
+
 def test_a_program_reads_one_object_a_line(capsys: pytest.CaptureFixture[str]) -> None:
     logs.configure("info", "json")
     _log.info("two\nlines, \u00fcml\u00e4ut and a %d", 7)

@@ -1,4 +1,4 @@
-"""Text from a robot, made safe for a terminal.
+"""Text from outside, made safe for a terminal and for a log of one line per record.
 
 A terminal obeys control characters (ECMA-48): an escape sequence sets its title or writes the clipboard (OSC
 52), a line feed forges a line of a log, and bidirectional overrides reorder what is read (Unicode UAX #9).

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from console.printable import escaped, printable, printable_lines
+from common.printable import escaped, printable, printable_lines
 from tests.support.control_characters import CONTROL_CHARACTERS
 
 
