@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from common.backoff import Backoff
 from common.errors import UserError
 from common.private_files import make_own_directory, write_private
 from drive.episode import Episode
@@ -20,6 +21,8 @@ from drive.values import Latch
 _log = logging.getLogger(__name__)
 
 _CLOSE_S: Final = 1.0
+_FIRST_PAUSE_S: Final = 0.5
+_LONGEST_PAUSE_S: Final = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +77,8 @@ def read_stops(path: Path) -> Stops:
 class StopFile:
     """Writes stops in a thread of its own: a slow disk delays nothing. Only the newest counts.
 
+    What the disk refuses is tried again, with pauses, until it takes it or something newer is to be written.
+
     Args:
         path: of the file; its directory is made this user's own.
 
@@ -112,13 +117,19 @@ class StopFile:
         self._thread.join(_CLOSE_S)
 
     def _run(self) -> None:
+        backoff = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S)
+        pause_s: float | None = None
         while True:
             with self._changed:
-                self._changed.wait_for(lambda: self._closed or self._newest != self._taken)
-                if self._newest == self._taken:
+                self._changed.wait_for(lambda: self._closed or self._newest != self._taken, pause_s)
+                if self._closed and self._newest == self._taken:
                     return
                 self._taken = self._newest
             try:
                 write_private(self._path, self._taken.as_json().encode())
             except UserError as error:
-                _log.error("the stop is not kept over a restart: %s", error)
+                pause_s = backoff.next_s()
+                _log.error("the stop would not outlive a restart (attempt %d): %s", backoff.failures, error)
+            else:
+                pause_s = None
+                backoff.reset()

@@ -483,14 +483,20 @@ def _request_id() -> str:
 
 
 async def _first_answer(attempts: "list[asyncio.Task[results.RobotStopped]]") -> results.RobotStopped:
-    """Returns the first answer; a connection that fails leaves it to the others."""
-    waiting = set(attempts)
+    """Returns the first answer. No failure of one connection withdraws what the other still carries.
+
+    Raises:
+        GatewayError: all have failed; what the robot has said counts more than silence.
+    """
+    waiting, errors = set(attempts), list[BaseException]()
     try:
-        while True:
+        while waiting:
             done, waiting = await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
             for each in done:
                 error = each.exception()
-                if error is None or not waiting or not isinstance(error, Unreachable | DeadlineExceeded):
+                if error is None:
                     return each.result()
+                errors.append(error)
+        raise min(errors, key=lambda error: isinstance(error, Unreachable | DeadlineExceeded))
     finally:
         await cancel(attempts)

@@ -22,7 +22,7 @@ def program_findings(state: pb.ActualState) -> Iterator[Finding]:
             "drive.stop",
             f"the robot was stopped by {state.stop.by}{reason}",
             "Nothing moves until the stop is reset",
-            "Look at the robot, then type: robotctl reset-stop",
+            f"Look at the robot, then type: robotctl reset-stop {state.stop.stop_id}",
         )
     if state.inhibits:
         names = ", ".join(pb.Inhibit.Name(each).removeprefix("INHIBIT_") for each in state.inhibits)

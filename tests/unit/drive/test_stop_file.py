@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from common.errors import UserError
+from common.private_files import write_private
 from drive import stop_file
 from drive.episode import Episode
 from drive.stop_file import StopFile, Stops, read_stops
@@ -60,3 +62,45 @@ def test_a_disk_that_hangs_delays_nobody_and_keeps_the_newest(
     hangs.set()
     file.close()
     assert written == [STOPPED, Stops(999)]
+
+
+def test_what_a_full_disk_has_refused_is_written_when_it_has_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The defect: it was tried once, and a robot that was stopped then came up without the stop."""
+    refused, has_room, written = threading.Event(), threading.Event(), threading.Event()
+
+    def write(path: Path, content: bytes) -> None:
+        if not has_room.is_set():
+            refused.set()
+            raise UserError("No space left on device")
+        write_private(path, content)
+        written.set()
+
+    monkeypatch.setattr(stop_file, "write_private", write)
+    monkeypatch.setattr(stop_file, "_FIRST_PAUSE_S", 0.01)
+    path = tmp_path / "stop.json"
+    file = StopFile(path)
+    file.keep(STOPPED)
+    assert refused.wait(10)
+    has_room.set()
+    assert written.wait(10)
+    file.close()
+    assert read_stops(path) == STOPPED
+
+
+def test_a_disk_that_stays_full_does_not_keep_the_program(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refused = threading.Event()
+
+    def write(_path: Path, _content: bytes) -> None:
+        refused.set()
+        raise UserError("No space left on device")
+
+    monkeypatch.setattr(stop_file, "write_private", write)
+    file = StopFile(tmp_path / "stop.json")
+    file.keep(STOPPED)
+    assert refused.wait(10)
+    file.close()
+    assert not file._thread.is_alive()
