@@ -151,6 +151,8 @@ async def enroll(
         async with _connected(directory) as hub:
             await streams.add_command_consumer(hub, robot)
             await _list_robot(hub, user)
+        # First: a key that exists and is not listed could never be revoked.
+        directory.write(record)
         write_all_private(
             {
                 out / "bridge.creds": creds.text().encode(),
@@ -161,8 +163,6 @@ async def enroll(
         )
         if again:
             await _push_accounts(directory, record)
-        else:
-            directory.write(record)
 
 
 async def revoke(directory: HubDirectory, kind: Kind, name: str) -> None:
@@ -312,6 +312,7 @@ def operator_files(directory: HubDirectory, name: str, out: Path, *, days: float
     with directory.locked():
         allowed = permissions.operator(commands=False)
         record, creds = _issue(directory, "operator", name, allowed, days, again=again)
+        directory.write(record)  # First, as in `enroll`.
         write_all_private(
             {
                 out / "operator.creds": creds.text().encode(),
@@ -319,7 +320,6 @@ def operator_files(directory: HubDirectory, name: str, out: Path, *, days: float
                 out / "fleet.yaml": _fragment(record),
             }
         )
-        directory.write(record)
 
 
 def receiver_files(directory: HubDirectory, name: str, out: Path, *, days: float | None, again: bool) -> None:
@@ -330,6 +330,7 @@ def receiver_files(directory: HubDirectory, name: str, out: Path, *, days: float
     """
     with directory.locked():
         record, creds = _issue(directory, "receiver", name, permissions.receiver(), days, again=again)
+        directory.write(record)  # First, as in `enroll`.
         write_all_private(
             {
                 out / "receiver.creds": creds.text().encode(),
@@ -338,7 +339,6 @@ def receiver_files(directory: HubDirectory, name: str, out: Path, *, days: float
                 out / "fleet.yaml": _fragment(record),
             }
         )
-        directory.write(record)
 
 
 _KEYS: Final[dict[KeyName, KeyKind]] = {
@@ -357,6 +357,8 @@ def _account_tokens(
     keys: Mapping[KeyName, Key], fleet: str, revoked: Mapping[str, int], issued: int
 ) -> dict[str, str]:
     """Returns the tokens of the three accounts, by public key."""
+    # A key is never used again, so whatever it has signed is revoked, also by a clock that was ahead.
+    revoked = dict.fromkeys(revoked, _END_OF_TIME_S)
     services = permissions.SERVICES
     fleet_key = keys["fleet"].public
     accounts = {
@@ -374,6 +376,8 @@ def _account_tokens(
 
 
 _ACCOUNTS: Final[tuple[KeyName, ...]] = ("system", "fleet", "robots")
+_END_OF_TIME_S: Final = 253_402_300_799
+"""The last second of the year 9999: servers refuse tokens that were issued until then."""
 
 
 def _node_files(

@@ -3,15 +3,18 @@
 import asyncio
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AsyncExitStack
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from typer.testing import CliRunner
 
+from common.errors import UserError
+from fleet import identity
 from fleet.connection import FleetAddress, connect
 from fleet.errors import HubError, HubReason
 from hub import administration
@@ -71,6 +74,37 @@ def test_apply_ends_what_a_server_with_an_old_configuration_has_forgotten(hub: S
     _type(hub, "apply")
     assert not _admits(robot)
     assert _admits(other)
+
+
+def test_credentials_of_a_clock_that_was_ahead_are_revoked_too(
+    hub: SecureHub, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The defect: servers compare the time of issue with that of the revocation."""
+    with monkeypatch.context() as ahead:
+        ahead.setattr(identity, "time", SimpleNamespace(time=lambda: time.time() + 3600))
+        robot = hub.enroll("r1")
+    assert _admits(robot)
+    _type(hub, "revoke", "r1")
+    assert not _admits(robot)
+
+
+def test_no_key_exists_that_is_not_listed(hub: SecureHub, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It could never be revoked."""
+
+    def full(_files: object) -> None:
+        raise UserError("No space left on device")
+
+    monkeypatch.setattr(administration, "write_all_private", full)
+    out, directory = hub.path / "files", hub.directory
+    issues: dict[str, Callable[[], None]] = {
+        "robot": lambda: asyncio.run(administration.enroll(directory, "one", out)),
+        "operator": lambda: administration.operator_files(directory, "one", out, days=None, again=False),
+        "receiver": lambda: administration.receiver_files(directory, "one", out, days=None, again=False),
+    }
+    for kind, issue in issues.items():
+        with pytest.raises(UserError, match="No space"):
+            issue()
+        assert any((each.kind, each.name) == (kind, "one") for each in directory.read().users)
 
 
 @pytest.mark.timed
