@@ -31,6 +31,7 @@ from bridge.uploads.queue import (
     LONGEST_PAUSE_S,
     MOST_KEPT,
     MOST_WAITING,
+    TRANSITIONS,
     WAITING,
     Event,
     Priority,
@@ -329,7 +330,9 @@ class Uploads:
             if head.state is not State.QUEUED:
                 await self._apply(head.recording_id, Event.RESUME)
             await self._apply(head.recording_id, Event.BEGIN)
-            self._begin(head.recording_id)
+            begun = self._uploads.get(head.recording_id)
+            if begun and begun.state is State.UPLOADING:
+                self._begin(head.recording_id)
 
     def _begin(self, recording_id: str) -> None:
         assert self._sender, "an attempt begins while it runs"  # noqa: S101  # run() has set it
@@ -417,8 +420,9 @@ class Uploads:
         return recording
 
     async def _apply(self, recording_id: str, event: Event, reason: str = "") -> None:
-        """Changes an upload, if it is still there."""
-        if upload := self._uploads.get(recording_id):
+        """Changes an upload; not one that was cancelled, or has gone, while another row was written."""
+        upload = self._uploads.get(recording_id)
+        if upload and event in TRANSITIONS[upload.state]:
             await self._keep(step(upload, event, self._now_s, reason))
 
     async def _keep(self, upload: Upload) -> None:
