@@ -171,7 +171,7 @@ class ManualRecorder:
         await self.keep(done or manifest)
 
     async def keep(self, manifest: Manifest) -> None:
-        """Writes a manifest; where the disk refuses, the memory has it until the next change."""
+        """Writes a manifest; where the disk refuses, the memory has it, and it is tried again."""
         if self.running and self.running.id == manifest.id:
             self.running = manifest
         await attempt(

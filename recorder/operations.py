@@ -6,7 +6,13 @@ import time
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Concatenate, Final, ParamSpec, TypeVar
 
-from common.errors import InvalidRequestError, NotFoundError, PreconditionError
+from common.errors import (
+    InvalidRequestError,
+    NotFoundError,
+    PreconditionError,
+    RecorderUnreachableError,
+    TooMuchError,
+)
 from common.reasons import Reason
 from recorder.assembly import Parts
 from recorder.lifecycle import Event, State
@@ -42,6 +48,9 @@ def _changing(
     async def changing(self: "Operations", /, *args: _P.args, **kwargs: _P.kwargs) -> _T:
         lock = self._recorder.changing
         await lock.acquire()
+        if self._recorder.ending:
+            lock.release()
+            raise RecorderUnreachableError("the recorder is being ended; try again when it is back")
         work = asyncio.create_task(operation(self, *args, **kwargs))
         work.add_done_callback(lambda _: lock.release())
         try:
@@ -99,14 +108,17 @@ class Operations:
         Raises:
             NotFoundError: there is no such, or none runs.
         """
+        running = self._manual.running
+        asked = recording_id or (running.id if running else "")
         work = asyncio.ensure_future(self._stop(request_id, recording_id))
         try:
             async with asyncio.timeout(_STOP_WAIT_S):
                 return await asyncio.shield(work)
         except TimeoutError:
             work.add_done_callback(_log_failure)
-            running = self._manual.running or self._status_reader.get(recording_id)
-            return Result(f"{running.id} is still being finalised", running)
+            if not asked:
+                raise NotFoundError("no recording runs", Reason.RECORDING_NOT_FOUND) from None
+            return Result(f"{asked} is still being finalised", self._status_reader.get(asked))
 
     @_changing
     async def _stop(self, request_id: str, recording_id: str) -> Result:
@@ -164,6 +176,7 @@ class Operations:
 
         Raises:
             NotFoundError: there is no such.
+            TooMuchError: the disk refuses to keep that; it is tried again, and holds until a restart.
         """
         if earlier := self._earlier("PinRecording", request_id):
             return earlier
@@ -171,6 +184,12 @@ class Operations:
         manifest = self._status_reader.get(recording_id).model_copy(update={"pinned": pinned})
         await self._manual.keep(manifest)
         message = f"{recording_id} is pinned" if pinned else f"{recording_id} is no longer pinned"
+        if recording_id in self._parts.catalogue.unwritten:
+            raise TooMuchError(
+                f"{message}, but the disk refuses to keep that over a restart; it is tried again: make room, "
+                "or check the disk",
+                Reason.DISK_FULL,
+            )
         return await self._answer("PinRecording", request_id, message, manifest)
 
     @_changing
@@ -188,9 +207,18 @@ class Operations:
         await self._recorder.take_reports()
         manifest = self._status_reader.get(recording_id)
         _check_deletable(manifest, expected_sha256, force=force)
-        await asyncio.to_thread(self._parts.catalogue.delete, manifest)
-        _log.info("deleted %s", recording_id)
-        return await self._answer("DeleteRecording", request_id, f"{recording_id} is deleted", None)
+        message = f"{recording_id} is deleted"
+        try:
+            await asyncio.to_thread(self._parts.catalogue.delete, manifest)
+        except OSError as error:
+            if self._parts.catalogue.get(recording_id):
+                raise TooMuchError(
+                    f"the disk refuses to delete {recording_id}: {error.strerror}; check the disk",
+                    Reason.DISK_FULL,
+                ) from error
+            message = f"{message}; the disk still has files of it, and they are deleted later"
+        _log.info("%s", message)
+        return await self._answer("DeleteRecording", request_id, message, None)
 
     @_changing
     async def report_fault(self, fault_id: str, severity: int, message: str) -> str:

@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import time
+from collections.abc import Callable, Collection
 from typing import Final, Literal
 
 from recorder.assembly import Parts
@@ -32,6 +33,7 @@ class Recorder:
 
     Attributes:
         changing: held by whatever changes something.
+        ending: whether nothing may be begun any more.
     """
 
     def __init__(self, parts: Parts, status_reader: StatusReader) -> None:
@@ -46,7 +48,10 @@ class Recorder:
         self._room_at_s = 0.0
         self._notified: object = None
         self._deletions = Retries(self._loop.time)
+        self._manifests = Retries(self._loop.time)
+        self._completions = Retries(self._loop.time)
         self.changing = asyncio.Lock()
+        self.ending = False
 
     async def run(self, stop: asyncio.Event) -> None:
         """Recovers what was cut off, records until `stop`, and closes everything in order.
@@ -185,7 +190,12 @@ class Recorder:
         self._check_writer()
         await self.take_reports()
         await self._try_again()
-        await self._end_deletions()
+        catalogue = self._parts.catalogue
+        for otherwise, behind, work, retries in (
+            ("files of deleted recordings stay", catalogue.cut_off, catalogue.end_deletions, self._deletions),
+            ("manifests are not on the disk", catalogue.unwritten, catalogue.write_again, self._manifests),
+        ):
+            await _caught_up(otherwise, behind, work, retries)
         if self._manual.at_its_limit:
             await self.end(StopReason.LIMIT)
         if self._ring:
@@ -208,6 +218,7 @@ class Recorder:
             self._lifecycle.changes.notify_all()
 
     async def _shut_down(self) -> None:
+        self.ending = True
         await self.take_reports()
         if self._ring:
             await self.finish_snapshots(self._ring.due(all_of_them=True), StopReason.SHUTDOWN)
@@ -231,16 +242,8 @@ class Recorder:
             # A full disk may need its own room.
             await self._parts.housekeeping.make_room(LEAST_ROOM, recordings=False)
             await self._open_ring()
-
-    async def _end_deletions(self) -> None:
-        """Goes on with deletions that the disk has failed."""
-        catalogue = self._parts.catalogue
-        if not (catalogue.cut_off and self._deletions.due):
-            return
-        if await attempt("files of deleted recordings stay", catalogue.end_deletions):
-            self._deletions.succeeded()
-        else:
-            self._deletions.failed()
+        if self._lifecycle.state is not State.FAULTED and self._completions.due:
+            await self._complete_faulted()
 
     async def _retry(self) -> None:
         """Tries whether the disk takes data again."""
@@ -253,12 +256,30 @@ class Recorder:
         except OSError as error:
             self._lifecycle.fault(f"the disk can't be written: {error.strerror}; make room or check it")
             return
-        for manifest in self._status_reader.recordings:
-            if manifest.state is RecordingState.FAULTED and manifest.metadata is None:
-                await self._manual.make_whole(manifest)
+        await self._complete_faulted()
         self._lifecycle.clear()
         _log.info("the disk takes data again")
         await self._open_ring()
+
+    async def _complete_faulted(self) -> None:
+        """Makes recordings and snapshots whole that the disk has refused at their end."""
+        for manifest in self._incomplete:
+            await self._manual.make_whole(manifest)
+        if self._incomplete:
+            self._completions.failed()
+        else:
+            self._completions.succeeded()
+
+    @property
+    def _incomplete(self) -> list[Manifest]:
+        """What is to be made whole; not what the disk refuses to read, which the next start tries again."""
+        return [
+            each
+            for each in self._status_reader.recordings
+            if each.state is RecordingState.FAULTED
+            and each.metadata is None
+            and each.id not in self._parts.catalogue.problems
+        ]
 
     async def _keep_room(self) -> None:
         """Makes room for what is written. The ring alone deletes no recording: it gives way itself."""
@@ -290,3 +311,22 @@ class Recorder:
         # A full disk is no fault: a recording that begins may delete older ones, which the ring may not.
         if self._lifecycle.state is State.IDLE and not is_full(error):
             self._lifecycle.fault(self._ring.problem)
+
+
+async def _caught_up(
+    otherwise: str, behind: Collection[object], work: Callable[[], bool], retries: Retries
+) -> None:
+    """Goes on with what the disk has failed, when it is due.
+
+    Args:
+        otherwise: what follows where it fails again, for the log.
+        behind: what is outstanding.
+        work: does it.
+        retries: of this work.
+    """
+    if not behind or not retries.due:
+        return
+    if await attempt(otherwise, work):
+        retries.succeeded()
+    else:
+        retries.failed()

@@ -44,12 +44,14 @@ class Catalogue:
         revision: grows with every change.
         problems: by recording, for people: what keeps it from being completed.
         cut_off: folders of deleted recordings that still have files: `end_deletions` goes on.
+        unwritten: IDs of recordings whose newest manifest the disk has refused: `write_again` tries again.
     """
 
     def __init__(self, root: Path) -> None:
         self.revision = 0
         self.problems: dict[str, str] = {}
         self.cut_off: set[Path] = set()
+        self.unwritten: set[str] = set()
         self._folder = root / RECORDINGS
         self._manifests: dict[str, Manifest] = {}
 
@@ -82,6 +84,7 @@ class Catalogue:
         make_directory(self._folder)
         self.problems.clear()
         self.cut_off.clear()
+        self.unwritten.clear()
         for folder in sorted(self._folder.iterdir()):
             if not ID.fullmatch(folder.name) or folder.is_symlink() or not folder.is_dir():
                 continue
@@ -117,11 +120,26 @@ class Catalogue:
         """Writes a recording's manifest, and has it in place of the former one.
 
         Raises:
-            OSError: the disk is full or fails; then the memory alone has it.
+            OSError: the disk is full or fails; then the memory alone has it: see `unwritten`.
         """
         self._manifests[manifest.id] = manifest
         self.revision += 1
+        self.unwritten.add(manifest.id)
         manifest.write(self.folder_of(manifest))
+        self.unwritten.discard(manifest.id)
+
+    def write_again(self) -> bool:
+        """Writes the manifests that the disk has refused; returns True.
+
+        Raises:
+            OSError: the disk is full or fails; it can be tried again.
+        """
+        for manifest in [self._manifests[each] for each in sorted(self.unwritten)]:
+            if self.folder_of(manifest).is_dir():  # It may have been deleted by hand.
+                self.write(manifest)
+            else:
+                self.unwritten.discard(manifest.id)
+        return True
 
     def delete(self, manifest: Manifest) -> None:
         """Deletes a recording's files, and its folder unless something unknown is in it.
@@ -193,6 +211,7 @@ class Catalogue:
     def _forget(self, manifest: Manifest) -> None:
         self._manifests.pop(manifest.id, None)
         self.problems.pop(manifest.id, None)
+        self.unwritten.discard(manifest.id)
         self.revision += 1
 
 

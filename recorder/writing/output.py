@@ -113,6 +113,8 @@ class Output:
         self._segment: SegmentWriter | None = None
         self._path = Path()
         self._began_ns = 0
+        self._head_bytes = 0
+        """Of the present segment: a head that is longer than a segment must not end it at each message."""
         self._clock_offset_ns = 0
         self._closed_bytes = 0
         self._messages = 0
@@ -143,6 +145,7 @@ class Output:
                 # As of now: its own instant may lie hours before the segment.
                 self._segment.write(replace(sample, log_time_ns=calendar_ns, monotonic_ns=now_ns))
                 self._messages += 1
+        self._head_bytes = self._segment.size
         self._report()
 
     def write(self, item: Item) -> None:
@@ -219,7 +222,7 @@ class Output:
             # By the sample's own pair: more of the old clock's may wait in the queue.
             self._clock_offset_ns = offset_ns
             segment = self._opened
-        elif segment.size >= self.shape.max_bytes:
+        elif segment.size - self._head_bytes >= self.shape.max_bytes:
             self.rotate()
             segment = self._opened
         segment.write(sample)

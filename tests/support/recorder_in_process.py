@@ -95,6 +95,7 @@ class Running:
     queue: SampleQueue
     sources: NoSources
     settings: RecorderSettings
+    recorder: Recorder
 
     async def written(self, count: int) -> None:
         """Returns when so many messages of the running recording are on the disk."""
@@ -130,7 +131,8 @@ async def running_recorder(root: Path, boot_id: str = "boot", **values: Any) -> 
     recorder = Recorder(parts, status_reader)
     stop = asyncio.Event()
     task = asyncio.ensure_future(recorder.run(stop))
-    running = Running(Operations(parts, status_reader, recorder), status_reader, queue, sources, settings)
+    operations = Operations(parts, status_reader, recorder)
+    running = Running(operations, status_reader, queue, sources, settings, recorder)
     try:
         await running.until(lambda: task.done() or status_reader.phase.state is not State.RECOVERING)
         yield running

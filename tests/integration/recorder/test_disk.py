@@ -13,15 +13,22 @@ from pathlib import Path
 
 import pytest
 
-from common.errors import NotFoundError, PreconditionError, TooMuchError, UserError
+from common.errors import (
+    NotFoundError,
+    PreconditionError,
+    RecorderUnreachableError,
+    TooMuchError,
+    UserError,
+)
 from recorder.lifecycle import State
 from recorder.mcap.writer import SegmentWriter
 from recorder.requests import SnapshotOptions, StartOptions
 from recorder.store.folder import replace_file
 from recorder.store.lock import folder_lock
 from recorder.store.manifest import Copy, CopyState, Kind, Manifest, RecordingState, StopReason
-from recorder.values import Gap, GapCause
-from tests.support.recorder_in_process import Running, Source, numbers, running_recorder
+from recorder.values import Channel, Gap, GapCause, Sample
+from recorder.writing.output import Closed, Head, Output, Shape
+from tests.support.recorder_in_process import Running, Source, channel, numbers, running_recorder
 
 MIB = 1024 * 1024
 SLOW_S = 0.1
@@ -448,8 +455,8 @@ async def test_a_deletion_that_was_cut_off_is_gone_on_with(
 
         with monkeypatch.context() as patched:
             patched.setattr(Path, "unlink", cut)
-            with pytest.raises(OSError, match="as if"):
-                await running.operations.delete("1", done.id, b"", force=False)
+            answer = await running.operations.delete("1", done.id, b"", force=False)
+            assert answer.message.endswith("they are deleted later")
     async with running_recorder(tmp_path) as running:
         assert running.status_reader.recordings == []
         assert not running.status_reader.folder_of(done).exists()
@@ -470,8 +477,8 @@ async def test_a_deletion_that_the_disk_has_failed_ends_by_itself(
 
         with monkeypatch.context() as patched:
             patched.setattr(Path, "unlink", refuse)
-            with pytest.raises(OSError, match="Input"):
-                await running.operations.delete("1", done.id, b"", force=False)
+            answer = await running.operations.delete("1", done.id, b"", force=False)
+            assert answer.message.endswith("they are deleted later")
         assert (folder / "data" / "000000.mcap").exists()
         assert running.status_reader.recordings == []
         await running.until(lambda: not folder.exists())
@@ -627,7 +634,8 @@ async def test_the_room_that_is_told_has_what_older_recordings_make(small_disk: 
         assert not running.status_reader.disk_short
         ballast.unlink()
         fill(small_disk, 0)
-        await running.operations.pin("pin too", one.id, pinned=True)
+        with pytest.raises(TooMuchError, match="refuses to keep"):
+            await running.operations.pin("pin too", one.id, pinned=True)
         await running.until(lambda: running.status_reader.disk_short)
 
 
@@ -637,3 +645,116 @@ async def test_a_recording_that_was_deleted_by_hand_can_be_deleted(tmp_path: Pat
         shutil.rmtree(running.status_reader.folder_of(done))
         await running.operations.delete("1", done.id, b"", force=False)
         assert running.status_reader.recordings == []
+
+
+@contextmanager
+def refusing(monkeypatch: pytest.MonkeyPatch, *functions: str) -> Iterator[None]:
+    """The disk is full for these functions while the block lasts."""
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patched:
+        for function in functions:
+            patched.setattr(function, full)
+        yield
+
+
+async def test_a_pin_that_the_disk_refuses_is_no_success_and_is_kept_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The defect: "is pinned", and after a restart it was not."""
+    async with running_recorder(tmp_path) as running:
+        done = await recorded(running)
+        with refusing(monkeypatch, "recorder.store.manifest.replace_file"):
+            with pytest.raises(TooMuchError, match=f"{done.id} is pinned, but the disk refuses"):
+                await running.operations.pin("1", done.id, pinned=True)
+            assert running.status_reader.get(done.id).pinned, "until a restart"
+        await running.until(lambda: Manifest.model_validate_json(manifest_of(tmp_path, done)).pinned)
+        assert (await running.operations.pin("1", done.id, pinned=True)).message == f"{done.id} is pinned"
+
+
+def manifest_of(root: Path, recording: Manifest) -> bytes:
+    return (root / "recordings" / recording.id / "manifest.json").read_bytes()
+
+
+async def test_a_snapshot_that_the_disk_refuses_to_complete_is_completed_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The defect: with a ring alone it stayed as it was."""
+    async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
+        await running.until(lambda: running.status_reader.writes)
+        Source(running.queue).send(10)
+        with refusing(monkeypatch, "recorder.store.salvage.replace_file"):
+            made = (
+                await running.operations.snapshot("1", SnapshotOptions(pre_s=10, post_s=0), "x")
+            ).recording
+            assert made
+            await running.until(lambda: not running.status_reader.snapshots_pending)
+            assert running.status_reader.get(made.id).metadata is None
+        await running.until(lambda: running.status_reader.get(made.id).metadata)
+        assert running.status_reader.get(made.id).messages == 10
+
+
+async def test_a_deletion_that_the_disk_refuses_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with running_recorder(tmp_path) as running:
+        one, two = await recorded(running), await recorded(running, 2000)
+        with refusing(monkeypatch, "recorder.store.deletion.begin"):
+            with pytest.raises(TooMuchError, match=f"refuses to delete {one.id}"):
+                await running.operations.delete("1", one.id, b"", force=False)
+            assert running.status_reader.get(one.id) == one
+        with refusing(monkeypatch, "recorder.store.deletion.complete"):
+            answer = await running.operations.delete("2", two.id, b"", force=False)
+            assert answer.message.endswith("they are deleted later")
+        await running.until(lambda: not (tmp_path / "recordings" / two.id).exists())
+
+
+async def test_a_stop_that_takes_long_names_the_recording_that_it_stops(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("recorder.operations._STOP_WAIT_S", 0.05)
+    async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
+        await running.until(lambda: running.status_reader.writes)
+        await running.operations.start("1", StartOptions())
+        made = (await running.operations.snapshot("2", SnapshotOptions(pre_s=10, post_s=60), "x")).recording
+        assert made
+        async with running.recorder.changing:
+            stopped = await running.operations.stop("3", made.id)
+        assert stopped.message == f"{made.id} is still being finalised"
+        assert stopped.recording
+        assert stopped.recording.id == made.id
+
+
+async def test_nothing_begins_once_the_recorder_ends(tmp_path: Path) -> None:
+    """The defect: the next start found a recording that had been running."""
+    async with running_recorder(tmp_path) as running:
+        pass
+    with pytest.raises(RecorderUnreachableError):
+        await running.operations.start("1", StartOptions())
+    assert not list((tmp_path / "recordings").iterdir())
+
+
+def test_a_head_that_is_longer_than_a_segment_does_not_end_it_at_each_message(tmp_path: Path) -> None:
+    """Each would write it again: a large map, kept for late subscribers, would keep the disk busy."""
+    channel_of_map = channel("/map", latched=True)
+    closed: list[Closed] = []
+
+    def sample(of: Channel, size: int) -> Sample:
+        data, now_ns = os.urandom(size), time.time_ns()
+        return Sample(of, data, now_ns, now_ns, 1, time.monotonic_ns())
+
+    shape = Shape(tmp_path, "{:06d}.mcap".format, 0, "all", False, MIB, 60.0)
+    head = Head(latched=[sample(channel_of_map, 3 * MIB)])
+    output = Output(shape, lambda: head, lambda _, each: closed.append(each))
+    output.open()
+    for _ in range(10):
+        output.write(sample(channel(), 1000))
+        output.flush()
+    assert not closed
+    for _ in range(12):
+        output.write(sample(channel(), 100_000))
+        output.flush()
+    assert len(closed) == 1, "after its own bytes"
+    output.close()

@@ -80,11 +80,8 @@ class NoReceiver:
     async def request(self, _subject: str, _payload: bytes, _timeout_s: float, /) -> bytes:
         raise HubError(HubReason.NO_RESPONDERS, "no receiver")
 
-    async def request_many(
-        self, _subject: str, _payload: bytes, _silence_s: float, /
-    ) -> AsyncIterator[bytes]:
+    def request_many(self, _subject: str, _payload: bytes, _silence_s: float, /) -> AsyncIterator[bytes]:
         raise HubError(HubReason.NO_RESPONDERS, "no receiver")
-        yield b""
 
 
 async def is_gone(waiting: Any) -> bool:
