@@ -9,6 +9,11 @@ _SUSPENDED_NS: Final = 50_000_000
 """Shorter than any suspend, and than any deadline of driving."""
 
 
+def elapsed_s() -> float:
+    """Returns the seconds of CLOCK_BOOTTIME, which goes on in a suspend, and is never set."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME)
+
+
 @dataclass(frozen=True, slots=True)
 class _Offset:
     """How far CLOCK_BOOTTIME is ahead of CLOCK_MONOTONIC, which stands still in a suspend (clock_gettime(2)).

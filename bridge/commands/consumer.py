@@ -2,7 +2,6 @@
 
 import asyncio
 import logging
-import time
 from collections.abc import Callable
 from typing import Final
 
@@ -13,6 +12,7 @@ from bridge.commands.pending_requests import Pending, PendingRequests
 from bridge.config import BridgeSettings
 from bridge.jittered_backoff import JitteredBackoff
 from bridge.values import OutboxError
+from common.suspend import elapsed_s
 from common.token_bucket import TokenBucket
 from fleet.connection import Delivery, Hub
 from fleet.errors import HubError
@@ -39,7 +39,7 @@ class CommandConsumer:
         settings: of the bridge; `commands.allowed` is not empty.
         hub: brings them.
         requests: where requests wait for the gateway.
-        clock: monotonic seconds.
+        clock: monotonic seconds, in a suspend of the computer, too: commands grow old in it.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class CommandConsumer:
         settings: BridgeSettings,
         hub: Hub,
         requests: PendingRequests,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = elapsed_s,
     ) -> None:
         self._robot = settings.hub.robot
         self._allowed = frozenset(settings.commands.allowed)

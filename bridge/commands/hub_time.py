@@ -1,10 +1,11 @@
 """How old a command is: by the hub's clock, never by the robot's calendar clock alone. Pure.
 
 The hub stamps a command when its stream takes it, and says what time it is when it is asked (ConsumerInfo.ts
-of nats-server 2.10 and later). From the moment of the question the robot counts with its monotonic clock, so
-the age is rather too high than too low, by a round trip at the most, and steps of the calendar clock change
-nothing. A hub that does not say the time leaves the calendar clock, if the kernel has it synchronised
-(adjtimex(2)); otherwise the age is in doubt. Nodes of a cluster are expected to agree on the time.
+of nats-server 2.10 and later). From the moment of the question the robot counts with a monotonic clock that
+goes on in a suspend (CLOCK_BOOTTIME), so the age is rather too high than too low, by a round trip at the
+most, and steps of the calendar clock change nothing. A hub that does not say the time leaves the calendar
+clock, if the kernel has it synchronised (adjtimex(2)); otherwise the age is in doubt. Nodes of a cluster are
+expected to agree on the time.
 """
 
 from dataclasses import dataclass

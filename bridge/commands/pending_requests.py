@@ -1,7 +1,6 @@
 """The requests of the hub that wait for the gateway's answer, and how they end."""
 
 import asyncio
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
@@ -11,9 +10,12 @@ from bridge.outbox.outbox import Outbox
 from bridge.values import OutboxError
 from common.errors import NotFoundError
 from common.reasons import Reason
+from common.suspend import elapsed_s
 from omniseer.fleet.v1 import command_pb2 as pb
 
 MOST_PENDING: Final = 4
+ANSWER_WITHIN_S: Final = 8.0
+"""For the answer to a request that was begun in time, from the end of that time. Operators wait for 10 s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +39,7 @@ class PendingRequests:
         robot: its name in the fleet.
         outbox: keeps the results until the hub has them.
         changed: called after each change of `pending`.
-        clock: monotonic seconds.
+        clock: monotonic seconds, in a suspend of the computer, too.
     """
 
     def __init__(
@@ -45,7 +47,7 @@ class PendingRequests:
         robot: str,
         outbox: Outbox,
         changed: Callable[[], None],
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = elapsed_s,
     ) -> None:
         self._robot = robot
         self._outbox = outbox
@@ -62,6 +64,10 @@ class PendingRequests:
         """Those that may still be begun, the oldest first."""
         now_s = self._clock()
         return tuple(each for each in self._pending.values() if each.until_s > now_s)
+
+    def remaining_s(self, pending: Pending) -> float:
+        """Returns for how long it may still be begun; 0 where it may not be any more."""
+        return max(pending.until_s - self._clock(), 0.0)
 
     @property
     def is_full(self) -> bool:
@@ -113,10 +119,13 @@ class PendingRequests:
         self._changed()
 
     async def expire(self) -> None:
-        """Ends the requests that may not be begun any more; tried again if the disk refuses."""
+        """Ends the requests that may not be begun any more; tried again if the disk refuses.
+
+        Not before what the gateway has begun in time may have been answered.
+        """
         now_s = self._clock()
         for each in tuple(self._pending.values()):
-            if each.until_s <= now_s:
+            if each.until_s + ANSWER_WITHIN_S <= now_s:
                 why = "the robot's gateway did not answer in time"
                 try:
                     await self.answer(each.request.command_id, pb.COMMAND_OUTCOME_EXPIRED, why)

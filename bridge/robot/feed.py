@@ -16,6 +16,8 @@ _MESSAGE_CHARACTERS: Final = 1000
 _COMPONENT_CHARACTERS: Final = 100
 _RUN_ID: Final = re.compile(r"[A-Za-z0-9_-]{1,64}")
 """One token of a subject."""
+_LARGEST: Final = 2**63 - 1
+"""What SQLite holds; a run of a gateway has far fewer events."""
 
 
 class FeedError(Exception):
@@ -44,7 +46,7 @@ class Feed:
             reason: why events are missing, if some are.
 
         Raises:
-            FeedError: it names an impossible run.
+            FeedError: it names an impossible run or sequence.
         """
         match response.WhichOneof("item"):
             case "event":
@@ -60,7 +62,7 @@ class Feed:
 
     def _begin_after(self, here: event_pb2.EventPosition) -> list[Item]:
         """Returns the gap of a new outbox: all that the run has had."""
-        self.position = Position(_run(here.run_id), here.sequence)
+        self.position = Position(_run(here.run_id), _sequence(here.sequence))
         reason = DropReason.OUTBOX_LOST
         return [Gap(here.run_id, 1, here.sequence, reason, earlier=True, probes=self._probes)]
 
@@ -76,7 +78,7 @@ class Feed:
 
     def _up_to(self, place: event_pb2.EventPosition, reason: DropReason) -> list[Item]:
         """Returns the gap between the position and a place, if there is one."""
-        here, run_id, sequence = self.position, _run(place.run_id), place.sequence
+        here, run_id, sequence = self.position, _run(place.run_id), _sequence(place.sequence)
         if here is None:
             return []
         if here.run_id == run_id:
@@ -93,6 +95,12 @@ def _run(run_id: str) -> str:
     if not _RUN_ID.fullmatch(run_id):
         raise FeedError(f"the gateway names its run {run_id[:64]!r}, which can't be part of a subject")
     return run_id
+
+
+def _sequence(sequence: int) -> int:
+    if sequence >= _LARGEST:
+        raise FeedError(f"the gateway numbers an event {sequence}, which can't be")
+    return sequence
 
 
 def _event(event: event_pb2.Event) -> Event:

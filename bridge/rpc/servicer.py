@@ -1,6 +1,5 @@
 """BridgeService: receives, maps, calls, maps, replies."""
 
-import time
 from collections.abc import AsyncIterator
 from typing import Any, Final
 
@@ -94,7 +93,7 @@ class BridgeServicer(pb_grpc.BridgeServiceServicer):
             instance_id=self._run_id,
             status=self._status.message(),
             copies=self._uploads.copies(),
-            requests=[_request(each) for each in self._requests.pending],
+            requests=[_request(each, self._requests.remaining_s(each)) for each in self._requests.pending],
             not_taken=pb.NotTaken(
                 unreadable=self._not_taken.unreadable,
                 dropped=self._not_taken.dropped,
@@ -104,8 +103,7 @@ class BridgeServicer(pb_grpc.BridgeServiceServicer):
         )
 
 
-def _request(pending: Pending) -> pb.HubRequest:
-    remaining_s = max(pending.until_s - time.monotonic(), 0.0)
+def _request(pending: Pending, remaining_s: float) -> pb.HubRequest:
     message = pb.HubRequest(
         request_id=pending.request.command_id,
         issued_by=pending.request.issued_by,

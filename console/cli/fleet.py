@@ -112,8 +112,9 @@ def get(
     try:
         done = asyncio.run(_get(session, robot, recording_id, to, resume=resume, store_ca=store_ca))
     except KeyboardInterrupt:
-        words = shlex.join(["fleet", "get", robot, recording_id, "--to", str(to), "--resume"])
-        print(f"What was received stays. To go on, type: robotctl {words}", file=sys.stderr)
+        authority = ["--store-ca", str(store_ca)] if store_ca else []
+        words = ["fleet", "get", robot, recording_id, "--to", str(to), "--resume", *authority]
+        print(f"What was received stays. To go on, type: robotctl {shlex.join(words)}", file=sys.stderr)
         raise
     session.show({"ok": True, **exported_json(done)}, exported(done))
 
@@ -283,7 +284,8 @@ async def _command(session: FleetSession, robot: str, wanted: "Command", expires
                 return found
     raise HubUnreachableError(
         f"{robot} has not answered the command before it expired",
-        "It was not begun: a robot that is away refuses it when it is back",
+        "A robot that is away refuses it when it is back; one that had it in time may have begun it. Before "
+        f"you repeat it, type: robotctl fleet recordings {robot}",
         exit_code=ExitCode.UNREACHABLE,
     )
 

@@ -15,6 +15,7 @@ from common.errors import ExitCode, UserError
 from console.cli.session import Session, print_json, with_session
 from console.cli.tables import grid
 from console.cli.transfer_bar import TransferBar
+from console.cli.typed_options import typed_options
 from console.client import ExportOptions, GatewayClient, Recording, RecordingCopyState
 from console.client.export_path import path_below
 from console.client.exporting import ExportedRecording
@@ -217,8 +218,10 @@ def export(
     try:
         asyncio.run(_export(session, recording_id, to, resume=resume, limit_mbit=limit_mbit))
     except KeyboardInterrupt:
-        words = shlex.join(["record", "export", recording_id, "--to", str(to), "--resume"])
-        print(f"What was received stays. To go on, type: robotctl {words}", file=sys.stderr)
+        limit = ["--limit", f"{limit_mbit:g}"] if limit_mbit else []
+        words = ["record", "export", recording_id, "--to", str(to), "--resume", *limit]
+        hint = f"What was received stays. To go on, type: robotctl {shlex.join(words)}"
+        print(typed_options(sys.argv[1:]).repeated_in(hint), file=sys.stderr)
         raise
 
 

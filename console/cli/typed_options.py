@@ -14,7 +14,7 @@ from console.target import parse_target
 _OPTIONS: Final = ("--target", "--robot")
 _ASKING: Final = re.compile(
     r"\brobotctl (?=(?:status|watch|overlay|events|info|doctor|preview|stop|reset-stop|drive|record|view"
-    r"|monitor)\b)"
+    r"|monitor|record)\b)"
 )
 _LOGIN: Final = re.compile(r"(?<=\brobotctl login )NAME HOST:PORT\b")
 

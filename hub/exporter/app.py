@@ -3,12 +3,12 @@
 import asyncio
 import signal
 import time
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from typing import Final
 
 from common.metrics_endpoint import serving_metrics
-from common.tasks import cancel
+from common.tasks import first_to_end
 from fleet.clock import HubClock, read_clock
 from fleet.connection import FleetAddress, Hub, connect
 from fleet.errors import HubError
@@ -74,26 +74,31 @@ class FleetExporter:
             await asyncio.sleep(pause_s)
 
 
-@asynccontextmanager
-async def exporting(address: FleetAddress, host: str, port: int) -> AsyncIterator[int]:
-    """Serves the fleet's metrics until the block ends; yields the bound port.
+async def export(
+    address: FleetAddress,
+    host: str,
+    port: int,
+    stop: asyncio.Event,
+    listening: Callable[[int], None] = lambda _: None,
+) -> None:
+    """Serves the fleet's metrics until `stop`.
 
     Args:
         address: Of the hub.
         host: An address of this machine.
         port: 0 for any free one.
+        stop: Ends it.
+        listening: Called with the bound port.
 
     Raises:
         UserError: The address can't be bound.
     """
     async with connect(address) as hub:
         exporter = FleetExporter(hub)
-        following = asyncio.create_task(exporter.run())
-        try:
-            async with serving_metrics(exporter.collector.text, host, port) as bound:
-                yield bound
-        finally:
-            await cancel([following])
+        async with serving_metrics(exporter.collector.text, host, port) as bound:
+            listening(bound)
+            # A defect ends the program: a page with the last state for ever would raise no alarm.
+            await first_to_end(stop.wait(), exporter.run())
 
 
 async def export_until_stopped(address: FleetAddress, host: str, port: int) -> None:
@@ -102,9 +107,8 @@ async def export_until_stopped(address: FleetAddress, host: str, port: int) -> N
     Raises:
         UserError: The address can't be bound.
     """
-    stopped = asyncio.Event()
+    stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, stopped.set)
-    async with exporting(address, host, port):
-        await stopped.wait()
+        loop.add_signal_handler(number, stop.set)
+    await export(address, host, port, stop)

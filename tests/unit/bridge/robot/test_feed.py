@@ -1,5 +1,7 @@
 """What the gateway's stream becomes in the outbox's order."""
 
+from typing import Any
+
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -84,6 +86,18 @@ def test_a_huge_event_is_shortened() -> None:
 def test_a_run_that_is_no_part_of_a_subject_is_refused(run_id: str) -> None:
     with pytest.raises(FeedError, match="part of a subject"):
         fed(Feed(Position("a", 3)), event(1, run_id))
+
+
+@pytest.mark.parametrize("make", [event, gap, caught_up])
+def test_a_number_that_the_outbox_can_t_hold_is_refused(make: Any) -> None:
+    """The defect: SQLite refused it in a way that ended the bridge, again and again."""
+    for position in (Position("a", 3), None):
+        feed = Feed(position)
+        if position is None and make is not caught_up:
+            continue
+        with pytest.raises(FeedError, match="which can't be"):
+            fed(feed, make(2**63 + 1, "a"))
+        assert feed.position == position
 
 
 _RESPONSES = st.builds(

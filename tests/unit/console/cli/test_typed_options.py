@@ -41,7 +41,7 @@ def test_the_robot_is_repeated(words: str, repeated: str) -> None:
     assert typed_options(words.split()).repeated_in("Type: robotctl status") == repeated
 
 
-@pytest.mark.parametrize("command", sorted(COMMANDS.keys() - FOR_NO_ROBOT))
+@pytest.mark.parametrize("command", sorted({*COMMANDS, "record"} - FOR_NO_ROBOT))
 def test_every_command_for_a_robot_gets_it(command: str) -> None:
     text = typed_options(["--robot", "lab2", "doctor"]).repeated_in(f"Type: robotctl {command}")
     assert text == f"Type: robotctl --robot lab2 {command}"
