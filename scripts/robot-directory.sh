@@ -10,11 +10,20 @@ current_tag() {
   echo "${named:-latest}"
 }
 
-set_tag() {  # in .env, as one change: a power cut leaves the old file or the new one
-  { grep -v '^TAG=' "$robot/.env" 2> /dev/null || true; echo "TAG=$1"; } > "$state/env"
-  [ ! -e "$robot/.env" ] || chmod --reference="$robot/.env" "$state/env"
-  sync "$state/env"
-  mv "$state/env" "$robot/.env"
+# In .env, as one change: a power cut leaves the old file or the new one. It stays its owner's, whoever upgrades, and a
+# link stays one.
+set_tag() {
+  local env new
+  env=$(realpath --canonicalize-missing "$robot/.env")
+  new=$(dirname "$env")/.env.new
+  (umask 077; { grep -v '^TAG=' "$env" 2> /dev/null || true; echo "TAG=$1"; } > "$new")
+  if [ -e "$env" ]; then
+    # One who may not give files away keeps this one.
+    chown --reference="$env" "$new" 2> /dev/null || true
+    chmod --reference="$env" "$new"
+  fi
+  sync "$new"
+  mv "$new" "$env"
 }
 
 # Puts the robot's own files into a tree that has not run here yet.

@@ -225,14 +225,33 @@ def test_up_and_back_and_forth_with_state_and_settings_kept(robot: Robot) -> Non
     assert robot.snapshot() == after
 
 
-def test_a_tag_that_moves_is_fixed_for_the_way_back(robot: Robot) -> None:
-    robot.begin(tag="latest")
-    (robot.directory / ".env").write_text(f"COMPOSE_PROJECT_NAME={robot.project}\n")
+@pytest.mark.parametrize("tag", ["latest", "latest-arm64"])
+def test_a_tag_that_moves_is_fixed_for_the_way_back(robot: Robot, tag: str) -> None:
+    """Back is what ran: neither what was built since, nor what was built before and never started."""
+    robot.begin(tag=tag)
+    if tag == "latest":
+        (robot.directory / ".env").write_text(f"COMPOSE_PROJECT_NAME={robot.project}\n")
+    robot.image(tag, "never-started")
     assert robot.upgrade(robot.release("9.1.0")).returncode == 0
-    robot.image("latest", "built-since")
+    robot.image(tag, "built-since")
     back = robot.upgrade("--rollback")
     assert back.returncode == 0, back.stderr
     assert robot.running() == "1.0.0"
+
+
+def test_the_settings_stay_their_owners_and_a_link_stays_one(robot: Robot) -> None:
+    """The defect: after an upgrade with sudo they were root's, and their owner could not read them."""
+    robot.begin()
+    settings, own = robot.directory / ".env", robot.directory.parent / "own.env"
+    settings.rename(own)
+    settings.symlink_to(own)
+    own.chmod(0o640)
+    os.chown(own, 12345, 12346)
+    assert robot.upgrade(robot.release("9.1.0")).returncode == 0
+    assert settings.readlink() == own
+    assert "TAG=9.1.0" in own.read_text()
+    found = own.stat()
+    assert (found.st_uid, found.st_gid, found.st_mode & 0o777) == (12345, 12346, 0o640)
 
 
 def test_a_service_that_was_started_by_hand_comes_along(robot: Robot) -> None:

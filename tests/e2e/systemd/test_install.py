@@ -130,10 +130,16 @@ def test_an_upgrade_and_back_keep_what_is_the_robots(robot: SystemdRobot) -> Non
     assert robot.property("preview", "ActiveState") == "inactive", "an upgrade starts nothing that was off"
     assert robot.property("preview", "UnitFileState") == "disabled"
 
+    # As a version has it that is older than a program.
+    before, unit = "/opt/robot-gateway/previous", "robot-tap.service"
+    robot.run("rm", f"{before}/share/robot/systemd/{unit}", f"{before}/bin/robot-tap")
+    robot.run("systemctl", "enable", unit)
     robot.run(SCRIPT, "--rollback")
     assert version(robot) == old
+    assert robot.run("systemctl", "cat", unit, check=False).returncode != 0
     robot.run(SCRIPT, "--rollback")
     assert version(robot) == "99.0.0"
+    assert robot.property("tap", "UnitFileState") == "enabled"
     for path in LEFT:
         robot.run("test", "-e", path)
 
