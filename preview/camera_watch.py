@@ -6,6 +6,7 @@ a file on a dead network share for example: it has a deadline in a thread of its
 """
 
 import asyncio
+import logging
 from collections.abc import Iterable
 from functools import partial
 from typing import Final, NoReturn
@@ -15,6 +16,8 @@ from preview.config import PreviewSettings
 from preview.pipeline import sources
 from preview.pipeline.threads import in_thread
 from preview.supervisor import Supervisor
+
+_log = logging.getLogger(__name__)
 
 LOOK_EVERY_S: Final = 2.0
 LOOK_DEADLINE_S: Final = 1.0
@@ -30,6 +33,9 @@ async def watch_cameras(supervisor: Supervisor, settings: PreviewSettings) -> No
             try:
                 supervisor.cameras_found(await in_thread(look, LOOK_DEADLINE_S))
             except TimeoutError:
+                pause_s = PAUSE_AFTER_HANG_S
+            except Exception:  # noqa: BLE001  # what a driver may do is not known; the others are watched on
+                _log.exception("cameras can't be looked at; that is tried again in %g s", PAUSE_AFTER_HANG_S)
                 pause_s = PAUSE_AFTER_HANG_S
         await asyncio.sleep(pause_s)
 

@@ -91,6 +91,7 @@ class LiveCamera:
         """
         self._showing = source
         self._task = asyncio.create_task(self._show(source, self._task), name="camera")
+        self._task.add_done_callback(lambda task: self._shown(task, source))
 
     def survives(self, fault: Fault) -> bool:
         """Whether the pipeline goes on without its live camera, which has this fault."""
@@ -168,6 +169,15 @@ class LiveCamera:
         if not running.has_ended:
             self._events.camera_shown(source.camera)
         await self._leave(dispose(running.parts.pipeline, old, self._stop_s), before)
+
+    def _shown(self, task: "asyncio.Task[None]", source: SourcePlan | None) -> None:
+        """Takes a defect for a failure of the camera: otherwise it would count as being started for ever."""
+        error = None if task.cancelled() else task.exception()
+        if error is None or source is None:
+            return
+        _log.error("%s could not be started", source.label, exc_info=error)
+        plan = replace(self._running.plan, source=source)
+        self._show_failed(source, faults.of(Blame.SOURCE, f"failed: {error}", plan))
 
     def _show_failed(self, source: SourcePlan, fault: Fault) -> None:
         if self._running.has_ended:

@@ -4,6 +4,7 @@ Pure: a source is a GStreamer description, property values that can't be quoted 
 its failure.
 """
 
+import os
 import stat
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -29,6 +30,7 @@ TAP_SOURCE = "cameratapsrc"
 CAMERA_DECODER = "cameradecoder"
 """Element of preview/pipeline/camera_decoder.py."""
 CLASS_DIR = Path("/sys/class/video4linux")
+CHARACTER_DEVICES = Path("/sys/dev/char")
 
 _REMEDY_CAMERA = "Check that the camera is connected and that this user may read it (group video)"
 _REMEDY_FORMAT = "; 'format: auto' takes whatever it offers"
@@ -102,11 +104,13 @@ def _plan(settings: PreviewSettings, camera: str, key: str, source: AnyKind) -> 
 def _camera(camera: str, source: V4l2Source, formats: str) -> SourcePlan:
     device = source.device or find_card(source.card)
     try:
-        mode = Path(device).stat().st_mode
+        status = Path(device).stat()
     except OSError as error:
         raise UserError(f"camera {device} can't be used: {error.strerror}", _REMEDY_CAMERA) from error
-    if not stat.S_ISCHR(mode):
+    if not stat.S_ISCHR(status.st_mode):
         raise UserError(f"camera {device} is not a device", "Name a device such as /dev/video11")
+    if not is_plugged_in(status.st_rdev):
+        raise UserError(f"camera {device} is not plugged in", _REMEDY_CAMERA)
     return SourcePlan(
         camera,
         f"camera {device}",
@@ -128,6 +132,16 @@ def _formats(form: CameraFormat, largest: Target, fps: int) -> str:
     size = f"width=[1,{largest.width_px}],height=[1,{largest.height_px}]"
     medias = _MEDIA_TYPES[form]
     return "; ".join([f"{media},{size},{rate}" for media in medias] + [f"{media},{rate}" for media in medias])
+
+
+def is_plugged_in(device: int, devices: Path = CHARACTER_DEVICES) -> bool:
+    """Returns whether the kernel has a device. In a container, its node outlives it.
+
+    Args:
+        device: its number, st_rdev of stat(2).
+        devices: of the kernel, by major and minor number; where there is no such list, every device counts.
+    """
+    return not devices.is_dir() or (devices / f"{os.major(device)}:{os.minor(device)}").exists()
 
 
 def find_card(card: str, class_dir: Path = CLASS_DIR) -> str:

@@ -1,7 +1,9 @@
 """Sources as plans: what is checked before GStreamer is asked."""
 
+import os
 import re
 import socket
+import stat
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +47,23 @@ def test_a_card_that_is_not_there_names_those_that_are(tmp_path: Path) -> None:
         sources.find_card("rkisp", found)
     with pytest.raises(UserError, match=r"\(found: none\)"):
         sources.find_card("rkisp", tmp_path / "nothing")
+
+
+def test_a_node_without_a_device_is_no_camera(tmp_path: Path) -> None:
+    """In a container the node stays when the camera is unplugged, and with it the camera counted as there."""
+    camera, other = os.makedev(81, 11), os.makedev(81, 12)
+    (tmp_path / "81:11").mkdir()
+    assert sources.is_plugged_in(camera, tmp_path)
+    assert not sources.is_plugged_in(other, tmp_path)
+    assert sources.is_plugged_in(other, tmp_path / "nothing"), "where the kernel's list is not to be seen"
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root makes device nodes")
+def test_a_camera_whose_node_alone_is_there_is_said_to_be_unplugged(tmp_path: Path) -> None:
+    node = tmp_path / "video11"
+    os.mknod(node, stat.S_IFCHR | 0o600, os.makedev(81, 4000))
+    with pytest.raises(UserError, match="is not plugged in"):
+        planned(V4l2Source(device=str(node)))
 
 
 def test_the_test_pattern_makes_any_rate_and_the_others_do_not(tmp_path: Path) -> None:

@@ -1,0 +1,38 @@
+"""Looking which cameras are there goes on, whatever a look ends with."""
+
+import asyncio
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from preview import camera_watch
+from preview.camera_watch import LOOK_EVERY_S, PAUSE_AFTER_HANG_S, watch_cameras
+from preview.config import PreviewSettings
+from tests.support.virtual_time import in_virtual_time
+
+
+@in_virtual_time
+async def test_a_look_that_fails_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The defect: the first error was the last look, and no line of the log said so."""
+    looks, found_s = [ValueError("embedded null byte"), TimeoutError(), None], list[float]()
+    loop = asyncio.get_running_loop()
+
+    async def look(*_: object) -> dict[str, str]:
+        if error := looks.pop(0) if looks else None:
+            raise error
+        return {}
+
+    monkeypatch.setattr(camera_watch, "in_thread", look)
+    supervisor: Any = SimpleNamespace(
+        is_watched=True, unused_cameras=(), cameras_found=lambda _: found_s.append(loop.time())
+    )
+    began_s = loop.time()
+    watching = asyncio.create_task(watch_cameras(supervisor, PreviewSettings()))
+    while len(found_s) < 2:
+        await asyncio.sleep(1)
+        assert not watching.done()
+    watching.cancel()
+    first_s = found_s[0] - began_s
+    assert first_s == pytest.approx(2 * PAUSE_AFTER_HANG_S, abs=1)
+    assert found_s[1] - found_s[0] == pytest.approx(LOOK_EVERY_S, abs=0.1)
