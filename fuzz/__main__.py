@@ -38,6 +38,7 @@ NAMES: Final = (
     "video_stream",
     "video_tap",
     "camera_taps_packet",
+    "image_message",
     "segment",
     "export_request",
     "hubs_command",

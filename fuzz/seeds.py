@@ -33,6 +33,7 @@ from omniseer.gateway.v1 import (
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
 from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
 from recorder.mcap.records import bytes_of
+from tests.support.image_messages import BIG, compressed_image, image, jpeg_header, png
 from tests.support.mpegts_writer import PACKET_BYTES, Writer, coded_frame
 
 _STATUS: Final = system_status_pb2.SystemStatus(
@@ -259,6 +260,13 @@ _SEEDS: Final = {
         camera_tap.encode_text(camera_tap.Kind.PROBLEM, "no camera"),
         camera_tap.encode_watch("/camera/image_raw"),
         camera_tap.STATUS_REQUEST,
+    ],
+    "image_message": [
+        b"\0" + image("bgr8", 4, 2, 12, bytes(24)),
+        b"\0" + image("nv12", 4, 2, 4, bytes(12), order=BIG, big_endian=1),
+        b"\0" + image("mono16", 3, 2, 8, bytes(16)),
+        b"\xff" + compressed_image(jpeg_header(8, 8, before=b"\xff\xfe\x00\x04hi")),
+        b"\xff" + compressed_image(png(2, 2)),
     ],
     "segment": [b"\0" + recording.unfinished(), b"\1" + _chunk_content()],
     "export_request": [

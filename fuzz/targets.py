@@ -50,6 +50,8 @@ from omniseer.gateway.v1.robot_gateway_pb2 import SubscribeEventsResponse
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
 from preview.config import PreviewSettings
 from preview.rpc.mapping import desired_state
+from tap.image import read_compressed, read_image
+from tap.refusal import RefusedError
 from tests.support.control_characters import CONTROL_CHARACTERS
 
 Target = Callable[[bytes], None]
@@ -76,6 +78,15 @@ def camera_taps_packet(data: bytes) -> None:
     with suppress(camera_tap.MalformedPacketError):
         topic = camera_tap.decode_request(data)
         assert topic is None or camera_tap.is_topic(topic)
+
+
+def image_message(data: bytes) -> None:
+    """A message of an image topic, as the camera tap reads it: refused, or all of its pixels are there."""
+    read = read_compressed if data[:1] >= b"\x80" else read_image
+    with suppress(RefusedError):
+        frame = read(data[1:])
+        assert 0 < frame.size <= camera_tap.MAX_FRAME_BYTES
+        assert sum(map(len, frame.pieces)) == frame.size
 
 
 def gateways_request(data: bytes) -> None:
@@ -265,6 +276,7 @@ TARGETS: Final[Mapping[str, Target]] = MappingProxyType(
             video_stream,
             video_tap,
             camera_taps_packet,
+            image_message,
             segment,
             export_request,
             hubs_command,

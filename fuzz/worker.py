@@ -19,7 +19,18 @@ import atheris
 
 from fuzz import OUTPUT
 
-OURS: Final = ["bridge", "common", "console", "drive", "fleet", "gateway", "hub", "preview", "recorder"]
+OURS: Final = [
+    "bridge",
+    "common",
+    "console",
+    "drive",
+    "fleet",
+    "gateway",
+    "hub",
+    "preview",
+    "recorder",
+    "tap",
+]
 """Packages whose lines guide the fuzzer (a test looks for all that the targets import)."""
 _LONGEST_INPUT: Final = 4096
 _DEADLINE_S: Final = 10

@@ -15,6 +15,7 @@ _ALONE: Final = frozenset({0x01, *range(0xD0, 0xD9)})
 """Markers without a length: TEM, RST0 to RST7, SOI."""
 _START_OF_SCAN: Final = 0xDA
 _MOST_SEGMENTS: Final = 1000
+"""And fill bytes before them: each takes a while to look at."""
 _SOF_BYTES: Final = 7
 _IHDR_END: Final = 24
 
@@ -36,11 +37,12 @@ def _measure_jpeg(picture: memoryview) -> tuple[int, int]:
     """Walks the segments up to the frame header (ITU-T T.81 B.1.1 and B.2.2)."""
     at = 2
     for _ in range(_MOST_SEGMENTS):
-        while bytes(picture[at : at + 2]) == b"\xff\xff":
-            at += 1  # Fill bytes may precede a marker.
         if at + 4 > len(picture) or picture[at] != 0xFF:
             break
         marker = picture[at + 1]
+        if marker == 0xFF:
+            at += 1  # Fill bytes may precede a marker.
+            continue
         at += 2
         if marker in _ALONE:
             continue

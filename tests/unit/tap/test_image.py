@@ -1,5 +1,7 @@
 """Messages of image topics: what they show, and why others are refused."""
 
+import time
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -170,3 +172,12 @@ def test_a_compressed_picture_is_measured_and_passed_on_as_it_is() -> None:
 )
 def test_a_compressed_picture_that_no_decoder_is_to_get_is_refused(content: bytes, reason: Reason) -> None:
     assert reason_of(compressed_image(content), compressed=True) is reason
+
+
+def test_a_picture_of_fill_bytes_is_given_up_at_once() -> None:
+    """The defect: each was looked at, for seconds a picture, in which no other camera had the interpreter."""
+    message = compressed_image(b"\xff\xd8" + b"\xff" * (MAX_FRAME_BYTES - 2))
+    began_s = time.process_time()
+    with pytest.raises(RefusedError, match="without a frame header"):
+        read_compressed(message)
+    assert time.process_time() - began_s < 0.5
