@@ -62,8 +62,14 @@ class Deployment:
         ask(self._control, fields)
 
     def readings(self) -> dict[str, Reading]:
-        """Returns what each program has now, by its name."""
-        (worker,) = psutil.Process(self._drive.process.pid).children()
+        """Returns what each program has now, by its name.
+
+        Raises:
+            AssertionError: the drive program has no worker.
+            OSError, psutil.Error: a program has ended.
+        """
+        # One that a busy machine held up is replaced.
+        (worker,) = wait_until(psutil.Process(self._drive.process.pid).children, "a worker that drives")
         processes = {**self._processes, "robot-drive's worker": worker.pid}
         return {name: Reading.of(pid, self._logs.get(name)) for name, pid in processes.items()}
 

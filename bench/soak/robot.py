@@ -13,8 +13,10 @@ from contextlib import AbstractContextManager, contextmanager
 from itertools import cycle
 from typing import Final
 
+import psutil
+
 from bench.progress import log
-from bench.rows import Row
+from bench.rows import MeasurementError, Row
 from bench.soak.deployment import PASSING, STEADY, Deployment, deployment
 from bench.soak.operators import come_and_go
 from bench.soak.readings import FEWEST_ROUNDS, Reading, judge_together
@@ -48,11 +50,19 @@ def rows(_ground: None, wanted: set[str], minutes: float = MINUTES) -> list[Row]
                 failed_rounds += 1
                 what = f"{type(error).__name__}: {error}"
                 log(f"soak.robot: round {len(readings) + 1}, {fault.__name__}: {what}")
-            readings.append(robot.readings())
+            try:
+                readings.append(robot.readings())
+            except (OSError, psutil.Error, AssertionError) as error:
+                # What has been read so far is judged all the same.
+                log(f"soak.robot: the run ends in round {len(readings) + 1}: a program has ended ({error})")
+                failed_rounds += 1
+                break
             if len(readings) % _LOG_EVERY_ROUNDS == 0:
                 _log(len(readings), readings[-1])
             if time.monotonic() >= until_s and len(readings) >= FEWEST_ROUNDS:
                 break
+    if len(readings) < FEWEST_ROUNDS:
+        raise MeasurementError(f"the long run has ended after {len(readings)} rounds, too few to judge")
     rounds = f"operators, a viewer, a driver, a recording and a fault in {minutes:g} min"
     made = judge_together(readings, failed_rounds, "soak.robot_", rounds)
     return [row for row in made if row.name in wanted]
