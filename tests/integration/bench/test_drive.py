@@ -8,8 +8,8 @@ from bench.drive import cpu, losses, picture, revoking, stopping, thawing
 from bench.drive.ground import Ground, driven_ground, driver
 from tests.support.tcp_link import needs_tun
 
-pytestmark = pytest.mark.ros
 # Timed: on a machine that is busy with other tests, late commands would end the motion.
+pytestmark = [pytest.mark.ros, pytest.mark.timed]
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,6 @@ def test_a_round_of_a_fault(ground: Ground, fault: str) -> None:
 
 
 @needs_tun
-@pytest.mark.timed
 @pytest.mark.parametrize("fault", ["cable_cut", "downlink"])
 def test_a_round_of_a_fault_of_a_link(ground: Ground, fault: str) -> None:
     assert 0 < stopping.stopped_ms(ground, stopping.FAULTS[fault]) < 1000
@@ -35,12 +34,10 @@ def test_a_round_of_stops_under_siege(ground: Ground) -> None:
 
 
 @pytest.mark.gst
-@pytest.mark.timed
 def test_a_round_of_the_picture(ground: Ground) -> None:
     assert 0 < picture.stopped_ms(ground, "camera") < 2000
 
 
-@pytest.mark.timed
 def test_a_round_of_a_revocation(ground: Ground) -> None:
     assert 0 < revoking.moved_ms(ground) < 3000
 

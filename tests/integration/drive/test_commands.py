@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -53,10 +54,13 @@ def test_the_doctor_finds_mux_base_and_timeout_and_measures_what_a_pulse_does(ro
 
 
 def test_the_doctor_moves_nothing_while_a_driver_has_the_robot(robot: Driving) -> None:
-    robot.drive()
+    robot.drive(vx=0.1)
+    since_ns = time.monotonic_ns()
     done = robot_drive("doctor", "--config", str(robot.directory / "drive.yaml"), "--pulse", "--json")
     assert "left out" in findings(done)["pulse"]["what"]
-    assert robot.state().phase
+    seen = {round(speed, 6) for seen_ns, speed in robot.witness.seen if seen_ns >= since_ns}
+    assert seen
+    assert seen <= {0.0, 0.1}, "what the driver does, and nothing else"
 
 
 def test_the_health_check_follows_the_program(robot: Driving) -> None:

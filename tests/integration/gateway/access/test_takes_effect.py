@@ -208,9 +208,10 @@ async def added_and_revoked_s(robot: Robot, calls: Any) -> float:
 @pytest.mark.timed
 async def test_a_hundred_revoked_streams_end_within_a_second(tmp_path: Path) -> None:
     robot = new_robot(tmp_path)
-    credential, login = robot.add(Role.VIEWER)
-    async with guarded_gateway(robot, limits={"streams_per_connection": 100}):
-        calls = stub(robot)
+
+    async def took_s() -> float:
+        credential, login = robot.add(Role.VIEWER)
+        calls = stub(running)
         streams = [
             calls.SubscribeEvents(SubscribeEventsRequest(), metadata=login.metadata()) for _ in range(100)
         ]
@@ -219,10 +220,14 @@ async def test_a_hundred_revoked_streams_end_within_a_second(tmp_path: Path) -> 
         began_s = time.monotonic()
         robot.admin.revoke(credential.credential_id)
         ends = await asyncio.gather(*map(to_its_end, streams), return_exceptions=True)
-        assert time.monotonic() - began_s < 1.0
+        elapsed_s = time.monotonic() - began_s
         assert {each.code() for each in ends if isinstance(each, grpc.aio.AioRpcError)} == {
             grpc.StatusCode.UNAUTHENTICATED
         }
+        return elapsed_s
+
+    async with guarded_gateway(robot, limits={"streams_per_connection": 100}) as running:
+        await keeps_async(1.0, "s until a hundred revoked streams have ended", took_s)
 
 
 async def test_callers_who_leave_while_they_are_sent_away_harm_nobody(tmp_path: Path) -> None:

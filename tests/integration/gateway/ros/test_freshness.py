@@ -18,6 +18,7 @@ from gateway.status import sources as specs
 from gateway.status.board import Board
 from gateway.status.values import Received, Velocity
 from tests.support.boards import has_all, newest
+from tests.support.promise import keeps
 from tests.support.ros import simulated_robot
 from tests.support.talker import Talker
 from tests.support.waiting import wait_until
@@ -37,22 +38,25 @@ def age_s(board: Board) -> float:
 def test_an_age_is_counted_from_the_reception(talker: Talker) -> None:
     """Not from the moment of sampling, which comes 25 ms later on average."""
     board = Board()
-    late_s: list[float] = []
 
     def another_than(before: Received[Velocity] | None) -> Received[Velocity] | None:
         now = board[specs.ODOMETRY]
         return None if now is before else now
 
-    with intake([ODOMETRY], board) as running:
-        publisher = talker.meet(running, ODOMETRY.topic, OdometryMessage)
+    def median_ms() -> float:
+        late_s: list[float] = []
         for _ in range(21):
             before, sent_s = board[specs.ODOMETRY], time.monotonic()
             publisher.publish(OdometryMessage())
             late_s.append(wait_until(partial(another_than, before), "the next message").at_s - sent_s)
             # Somewhere else in the sampler's period each time.
             threading.Event().wait(0.0073 * (len(late_s) % 7))
-    assert min(late_s) >= 0, "no message is received before it is sent"
-    assert statistics.median(late_s) < 0.012
+        assert min(late_s) >= 0, "no message is received before it is sent"
+        return statistics.median(late_s) * 1000
+
+    with intake([ODOMETRY], board) as running:
+        publisher = talker.meet(running, ODOMETRY.topic, OdometryMessage)
+        keeps(12, "ms between the sending and the noted reception", median_ms)
 
 
 def test_a_publisher_whose_clock_is_wrong_does_not_change_the_age(talker: Talker) -> None:
