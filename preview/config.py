@@ -34,6 +34,8 @@ class AnySource(Section):
 
     fallback: str | None = None
     """Camera that takes its place while it fails. None: none does."""
+    silence_s: float | None = Field(default=None, gt=0, le=60)
+    """Without a frame for so long it has failed. None: `timeouts.source_silence_s`."""
 
 
 class TestSource(AnySource):

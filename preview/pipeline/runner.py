@@ -319,7 +319,8 @@ class Runner:
                 held_back = self._camera.held_back
                 watchdogs = Watchdogs(now, self._timeouts)  # It delivers, and its time has not come yet.
             rate_in = self._running.parts.rate.get_property("in")
-            silent = watchdogs.check(rate_in, self._framing.frames, now)
+            limit_s = self._running.plan.source.silence_s
+            silent = watchdogs.check(rate_in, self._framing.frames, now, limit_s)
             if silent and self._camera.name is not None:
                 self._fail(faults.of(*silent, self.plan))
             if self._running.has_ended:

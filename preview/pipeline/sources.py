@@ -53,6 +53,7 @@ class SourcePlan:
         properties: element name in the description -> property -> value, set after parsing.
         any_rate: generates any size and frame rate; other sources are converted.
         loops: restarts at its end.
+        silence_s: without a frame for so long it has failed; None: as for all cameras.
     """
 
     camera: str
@@ -62,6 +63,7 @@ class SourcePlan:
     properties: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     any_rate: bool = False
     loops: bool = False
+    silence_s: float | None = None
 
 
 def plan_camera(settings: PreviewSettings, camera: str) -> SourcePlan:
@@ -76,12 +78,13 @@ def plan_camera(settings: PreviewSettings, camera: str) -> SourcePlan:
     """
     source = settings.named_sources[camera]
     if not settings.cameras:
-        return _plan(settings, camera, "source", source)
+        return replace(_plan(settings, camera, "source", source), silence_s=source.silence_s)
     try:
         planned = _plan(settings, camera, f"cameras.{camera}", source)
     except UserError as error:
         raise UserError(f"camera {camera}: {error.what}", error.remedy) from error
-    return replace(planned, label=f"camera {camera} ({planned.label.removeprefix('camera ')})")
+    label = f"camera {camera} ({planned.label.removeprefix('camera ')})"
+    return replace(planned, label=label, silence_s=source.silence_s)
 
 
 def _plan(settings: PreviewSettings, camera: str, key: str, source: AnyKind) -> SourcePlan:

@@ -22,13 +22,16 @@ class Watchdogs:
         self._captured = self._encoded = 0
         self._captured_at = self._encoded_at = now
 
-    def check(self, captured: int, encoded: int, now: float) -> tuple[Blame, str] | None:
+    def check(
+        self, captured: int, encoded: int, now: float, silence_s: float | None = None
+    ) -> tuple[Blame, str] | None:
         """Evaluates the counts of this moment.
 
         Args:
             captured: frames from the source so far.
             encoded: encoded frames so far.
             now: monotonic seconds.
+            silence_s: limit of this source between two frames; None: that of all.
 
         Returns:
             The part that exceeds its limit, and the predicate of its fault. The source first: without frames
@@ -43,7 +46,8 @@ class Watchdogs:
         if encoded != self._encoded:
             self._encoded, self._encoded_at = encoded, now
         source_s, encoder_s = now - self._captured_at, now - self._encoded_at
-        if source_s > (self._timeouts.source_silence_s if captured else self._timeouts.start_s):
+        silence_limit_s = silence_s or self._timeouts.source_silence_s
+        if source_s > (silence_limit_s if captured else self._timeouts.start_s):
             return Blame.SOURCE, f"has sent no frame for {source_s:.1f} s"
         if captured and source_s <= encoder_limit_s < encoder_s:
             return Blame.ENCODER, f"has produced no frame for {encoder_s:.1f} s"

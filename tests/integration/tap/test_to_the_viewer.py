@@ -152,6 +152,17 @@ def test_a_frozen_tap_is_a_source_fault_too(tap: RunningTap, tmp_path: Path) -> 
         eye.sees("red")
 
 
+def test_a_camera_that_is_slow_by_nature_is_no_fault(tap: RunningTap, tmp_path: Path) -> None:
+    """A thermal camera, for example: every two seconds a picture, where others have failed after one."""
+    settings = {"source": ros(silence_s=5), "timeouts": {"source_silence_s": 1}}
+    with ros_camera(TOPIC, hz=0.5) as published, preview_of(tap, tmp_path, **settings) as preview:
+        preview.enable()
+        preview.running()
+        before = published.published
+        wait_until(lambda: published.published >= before + 3, "three pictures more", 20)
+        assert preview.running().counters == pb.Counters(starts=1)
+
+
 def test_a_killed_preview_costs_the_tap_nothing(tap: RunningTap, tmp_path: Path) -> None:
     with ros_camera(TOPIC) as published, shown(tap, tmp_path) as (preview, _):
         preview.process.kill()

@@ -73,6 +73,7 @@ def test_the_test_pattern_makes_any_rate_and_the_others_do_not(tmp_path: Path) -
     file = planned(FileSource(path=film))
     assert (file.any_rate, file.loops) == (False, True)
     assert file.properties["file"]["location"] == str(film)
+    assert planned(GstSource(description="videotestsrc", silence_s=5.0)).silence_s == 5.0
     described = planned(GstSource(description="videotestsrc"))
     assert (described.any_rate, described.loops, described.description) == (False, False, "videotestsrc")
 

@@ -28,6 +28,13 @@ def test_a_source_that_stalls() -> None:
     assert watchdogs.check(30, 30, 2.6) == (Blame.SOURCE, "has sent no frame for 1.6 s")
 
 
+def test_a_camera_that_is_slow_by_nature_has_a_limit_of_its_own() -> None:
+    watchdogs = dogs()
+    assert watchdogs.check(1, 1, 1.0, 5.0) is None
+    assert watchdogs.check(1, 1, 5.9, 5.0) is None
+    assert watchdogs.check(1, 1, 6.1, 5.0) == (Blame.SOURCE, "has sent no frame for 5.1 s")
+
+
 def test_an_encoder_that_never_begins_is_timed_from_the_first_frame() -> None:
     watchdogs = dogs()
     assert watchdogs.check(1, 0, 4.0) is None
