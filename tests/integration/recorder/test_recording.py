@@ -20,7 +20,7 @@ from recorder.store.folder import new_id
 from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason
 from recorder.values import Ended, GapCause, Loss
 from recorder.writing.output import Output
-from tests.support.recorder_in_process import Source, channel, numbers, running_recorder
+from tests.support.recorder_in_process import Running, Source, channel, numbers, running_recorder
 
 
 async def test_what_was_sent_is_there_and_rosbags_opens_the_folder(tmp_path: Path) -> None:
@@ -167,19 +167,29 @@ async def test_a_segment_that_the_disk_refuses_a_snapshot_is_a_gap_of_it(
         assert {gap.cause for gap in done.gaps} == {GapCause.DISK}
 
 
-async def test_a_ring_that_the_disk_has_damaged_is_a_gap_of_the_next_snapshot(tmp_path: Path) -> None:
+async def fill_ring(root: Path) -> None:
+    """Has three recorders, one after the other, write ten messages each into the ring."""
     for _ in range(3):
-        async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
+        async with running_recorder(root, ring={"preset": "all"}) as running:
             await running.until(lambda: running.status_reader.writes)
             Source(running.queue).send(10)
+
+
+async def snapshot_of(running: Running) -> Manifest:
+    """A snapshot of all that the ring has, once it is complete."""
+    await running.until(lambda: running.status_reader.writes)
+    made = await running.operations.snapshot("1", SnapshotOptions(pre_s=30, post_s=0), "someone")
+    assert made.recording
+    await running.until(lambda: not running.status_reader.snapshots_pending)
+    return running.status_reader.get(made.recording.id)
+
+
+async def test_a_ring_that_the_disk_has_damaged_is_a_gap_of_the_next_snapshot(tmp_path: Path) -> None:
+    await fill_ring(tmp_path)
     damaged = sorted((tmp_path / "ring").glob("*.mcap"))[1]
     damaged.write_bytes(bytes(damaged.stat().st_size))
     async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
-        await running.until(lambda: running.status_reader.writes)
-        made = await running.operations.snapshot("1", SnapshotOptions(pre_s=30, post_s=0), "someone")
-        assert made.recording
-        await running.until(lambda: not running.status_reader.snapshots_pending)
-        done = running.status_reader.get(made.recording.id)
+        done = await snapshot_of(running)
         assert numbers(running.status_reader, done) == [*range(1, 11)] * 2
         first, second = (each for each in done.segments if each.messages)
         gap = next(each for each in done.gaps if each.cause is GapCause.DISK)
@@ -188,16 +198,9 @@ async def test_a_ring_that_the_disk_has_damaged_is_a_gap_of_the_next_snapshot(tm
 
 async def test_every_time_that_the_recorder_did_not_run_is_a_gap_of_the_next_snapshot(tmp_path: Path) -> None:
     """The defect: only the last one was."""
-    for _ in range(3):
-        async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
-            await running.until(lambda: running.status_reader.writes)
-            Source(running.queue).send(10)
+    await fill_ring(tmp_path)
     async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
-        await running.until(lambda: running.status_reader.writes)
-        made = await running.operations.snapshot("1", SnapshotOptions(pre_s=30, post_s=0), "someone")
-        assert made.recording
-        await running.until(lambda: not running.status_reader.snapshots_pending)
-        done = running.status_reader.get(made.recording.id)
+        done = await snapshot_of(running)
         full = [each for each in done.segments if each.messages]
         assert [(gap.cause, gap.began_ns) for gap in done.gaps] == [
             (GapCause.INTERRUPTED, each.last_ns) for each in full

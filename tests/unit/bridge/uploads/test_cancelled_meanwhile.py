@@ -10,7 +10,7 @@ import pytest
 from bridge.uploads.queue import State, Upload
 from fleet.errors import HubError, HubReason
 from tests.support.eventually import eventually
-from tests.support.uploading import Robot, Rows, running_uploads
+from tests.support.uploading import Robot, Rows, Running, running_uploads
 
 HUB: Any = None
 TICKS_S = 0.3
@@ -41,19 +41,28 @@ def robot() -> Robot:
     return robot
 
 
+async def cancel_while_held(running: Running, rows: SlowRows) -> None:
+    """Cancels the upload while its row is being written, and gives what follows some ticks' time."""
+
+    async def is_gone() -> bool:
+        return not running.uploads.waiting
+
+    await rows.held.wait()
+    cancelling = asyncio.create_task(running.uploads.cancel("one"))
+    await eventually(is_gone, bool, "it is cancelled")
+    rows.released.set()
+    await cancelling
+    await asyncio.sleep(TICKS_S)
+    assert rows.rows["one"].state is State.LOCAL
+
+
 async def test_one_that_was_about_to_begin_is_not_uploaded(robot: Robot) -> None:
     """The defect: it was all the same, and its end ended the bridge."""
     rows = SlowRows(State.UPLOADING)
     async with asyncio.timeout(20), running_uploads(robot, HUB, "127.0.0.1:9", (), rows) as running:
         await running.uploads.enqueue("one")
-        await rows.held.wait()
-        cancelling = asyncio.create_task(running.uploads.cancel("one"))
-        await eventually(lambda: is_gone(running.uploads.waiting), bool, "it is cancelled")
-        rows.released.set()
-        await cancelling
-        await asyncio.sleep(TICKS_S)
+        await cancel_while_held(running, rows)
         assert not robot.opened
-        assert rows.rows["one"].state is State.LOCAL
 
 
 async def test_one_that_was_to_be_tried_again_is_not(robot: Robot) -> None:
@@ -65,13 +74,7 @@ async def test_one_that_was_to_be_tried_again_is_not(robot: Robot) -> None:
         await running.until("one", lambda each: each and each.state is State.FAILED)
         rows.held.clear()
         rows.released.clear()
-        await rows.held.wait()
-        cancelling = asyncio.create_task(running.uploads.cancel("one"))
-        await eventually(lambda: is_gone(running.uploads.waiting), bool, "it is cancelled")
-        rows.released.set()
-        await cancelling
-        await asyncio.sleep(TICKS_S)
-        assert rows.rows["one"].state is State.LOCAL
+        await cancel_while_held(running, rows)
 
 
 class NoReceiver:
@@ -82,7 +85,3 @@ class NoReceiver:
 
     def request_many(self, _subject: str, _payload: bytes, _silence_s: float, /) -> AsyncIterator[bytes]:
         raise HubError(HubReason.NO_RESPONDERS, "no receiver")
-
-
-async def is_gone(waiting: Any) -> bool:
-    return not any(waiting)
