@@ -263,7 +263,10 @@ class Recorder:
 
     async def _complete_faulted(self) -> None:
         """Makes recordings and snapshots whole that the disk has refused at their end."""
-        for manifest in self._incomplete:
+        incomplete = self._incomplete
+        if not incomplete:
+            return
+        for manifest in incomplete:
             await self._manual.make_whole(manifest)
         if self._incomplete:
             self._completions.failed()
@@ -275,7 +278,7 @@ class Recorder:
         """What is to be made whole; not what the disk refuses to read, which the next start tries again."""
         return [
             each
-            for each in self._status_reader.recordings
+            for each in self._parts.catalogue.all.values()
             if each.state is RecordingState.FAULTED
             and each.metadata is None
             and each.id not in self._parts.catalogue.problems
