@@ -11,8 +11,6 @@ from pathlib import Path
 from typing import Any, Final
 from unittest.mock import patch
 
-import psutil
-
 from bench.processes import program
 from tests.support.driven_robot import (
     DrivenRobot,
@@ -26,7 +24,6 @@ from tests.support.heard import Base
 from tests.support.running_drive import RunningDrive
 from tests.support.tcp_link import TcpLink
 from tests.support.udp_link import Impairment
-from tests.support.waiting import wait_until
 
 ONE_WAY_S: Final = 0.01
 """Of the links that lose packets: a round trip of 20 ms."""
@@ -47,8 +44,7 @@ class Ground:
     @property
     def worker_pid(self) -> int:
         """Process ID of the worker, which the guard replaces when it is lost."""
-        (worker,) = wait_until(psutil.Process(self.drive.process.pid).children, "a worker that drives")
-        return worker.pid
+        return self.drive.worker.pid
 
     @contextmanager
     def robot(self) -> Iterator[DrivenRobot]:

@@ -10,8 +10,6 @@ from pathlib import Path
 from typing import Any, Final
 from unittest.mock import patch
 
-import psutil
-
 from bench.product import serving
 from bench.soak.readings import Reading
 from common.ros_transport import VARIABLE
@@ -68,9 +66,7 @@ class Deployment:
             AssertionError: the drive program has no worker.
             OSError, psutil.Error: a program has ended.
         """
-        # One that a busy machine held up is replaced.
-        (worker,) = wait_until(psutil.Process(self._drive.process.pid).children, "a worker that drives")
-        processes = {**self._processes, "robot-drive's worker": worker.pid}
+        processes = {**self._processes, "robot-drive's worker": self._drive.worker.pid}
         return {name: Reading.of(pid, self._logs.get(name)) for name, pid in processes.items()}
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import psutil
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -36,6 +37,12 @@ class RunningDrive:
     process: subprocess.Popen[bytes]
     socket: Path
     log: Path
+
+    @property
+    def worker(self) -> psutil.Process:
+        """The worker's process; one that was lost is replaced."""
+        (worker,) = wait_until(psutil.Process(self.process.pid).children, "a worker that drives")
+        return worker
 
 
 @contextmanager

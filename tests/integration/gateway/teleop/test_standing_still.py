@@ -9,7 +9,6 @@ import signal
 import time
 from collections.abc import AsyncIterator, Iterator
 
-import psutil
 import pytest
 
 from console.client import (
@@ -96,7 +95,7 @@ async def test_a_drive_program_that_is_started_again_gets_the_lease_and_moves_on
 ) -> None:
     """The session goes on: DRIVE_LOST meanwhile, then the stop that the loss has left."""
     await in_motion(client, session, robot.base, SPEED_MPS)
-    worker = psutil.Process(robot.drive.process.pid).children()[0]
+    worker = robot.drive.worker
     async with held(session, SPEED_MPS):
         began_s = time.monotonic()
         worker.kill()
@@ -127,7 +126,7 @@ async def test_a_stop_while_the_drive_program_is_away_reaches_the_next_one(robot
         async def stop() -> StopLatch | None:
             return (await client.status()).teleop.stop
 
-        psutil.Process(robot.drive.process.pid).children()[0].kill()
+        robot.drive.worker.kill()
         await eventually(inhibits, lambda it: DriveInhibit.DRIVE_LOST in it, "the worker is gone")
         with pytest.raises(GatewayError, match="not confirmed the stop"):
             await client.stop_robot("a child")
