@@ -1,8 +1,7 @@
-"""What the hub's administrator does: make a hub, enroll, revoke, list.
+"""What the hub's administrator does once it runs: enroll, revoke, list, purge.
 
 | what happens | what follows |
 |---|---|
-| `init` is interrupted | there is no hub.json: it can be repeated |
 | the hub is unreachable during `enroll` | the robot's files are not written; repeat it |
 | `enroll` for an enrolled robot | refused, unless `again`: then new keys, and the old ones are revoked |
 | a server is down during `revoke` | the others refuse the robot at once, it within 15 s of its start |
@@ -13,100 +12,27 @@
 import asyncio
 import json
 import time
-from collections.abc import AsyncGenerator, Mapping, Sequence
+from collections.abc import AsyncGenerator, Sequence
 from contextlib import asynccontextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
 from common.backoff import Backoff
-from common.ca import KeyPair, issue_node_certificate, new_ca
-from common.errors import ExitCode, UserError
-from common.private_files import write_all_private, write_private
+from common.errors import UserError
+from common.private_files import write_all_private
 from fleet import names
 from fleet.connection import Hub, connect
 from fleet.errors import HubError, HubReason
-from fleet.identity import (
-    Account,
-    Credentials,
-    Key,
-    KeyKind,
-    Permissions,
-    account_jwt,
-    new_user,
-    operator_jwt,
-)
-from fleet.receipt_keys import ReceiptSigner, as_text, new_seed
+from fleet.identity import Credentials, Permissions, new_user
 from hub import permissions, streams
-from hub.directory import HubDirectory, HubRecord, KeyName, Kind, User
-from hub.server_config import Node, Places, server_config, with_accounts
+from hub.accounts import account_keys, account_tokens
+from hub.directory import HubDirectory, HubRecord, Kind, User, check_name
 
 _CONNECT_S: Final = 5.0
-_CA_DAYS: Final = 3650.0
-_SYSTEM: Final = Permissions(publish=("$SYS.REQ.CLAIMS.UPDATE",), subscribe=("_INBOX.>",))
 _PUSH_WITHIN_S: Final = 3.0
 _ELECTED_WITHIN_S: Final = 15.0
 """A cluster that lost a server has a leader again by then (docs/fleet.md)."""
-_MADE: Final = {"keys", "nodes", "admin.creds", "system.creds", "receipts.key", "receipts.pub"}
-"""What an interrupted `create` leaves."""
-
-
-@dataclass(frozen=True, slots=True)
-class HubPlan:
-    """What `create` makes.
-
-    Attributes:
-        fleet: its name.
-        nodes: one, or three.
-        places: directories on the servers.
-        max_store: disk space for streams on each, as "32GB".
-        sync_always: as `server_config`.
-    """
-
-    fleet: str
-    nodes: tuple[Node, ...]
-    places: Places = field(default_factory=Places)
-    max_store: str = "32GB"
-    sync_always: bool = True
-
-
-def create(directory: HubDirectory, plan: HubPlan) -> None:
-    """Creates keys, certificates and the servers' configuration. Nothing of it needs a server.
-
-    Raises:
-        UserError: there is a hub in this directory or anything else, or it can't be written.
-    """
-    if not names.ROBOT_NAME.fullmatch(plan.fleet):
-        raise _no_name(plan.fleet)
-    with directory.locked():
-        if directory.exists:
-            raise UserError(f"{directory.path} has a hub already", "Choose another directory with --out")
-        # In a checkout, the folder of this package has the name that comes to mind, and goes into images.
-        if others := sorted({each.name for each in directory.path.iterdir()} - _MADE):
-            raise UserError(
-                f"{directory.path} has other files: {others[0]}", "Choose another directory with --out"
-            )
-        keys = {name: Key.new(kind) for name, kind in _KEYS.items()}
-        ca = new_ca(f"{plan.fleet} hub", _CA_DAYS)
-        admin, _ = new_user(keys["fleet"], "administrator", permissions.administrator())
-        system, _ = new_user(keys["system"], "administrator", _SYSTEM)
-        seed = new_seed()
-        root = directory.path
-        issued = _now_s()
-        files = {
-            **{root / "keys" / f"{name}.nk": key.seed for name, key in keys.items()},
-            root / "keys" / "ca.pem": ca.certificate,
-            root / "keys" / "ca.key": ca.key,
-            root / "admin.creds": admin.text().encode(),
-            root / "system.creds": system.text().encode(),
-            root / "receipts.key": as_text([seed]).encode(),
-            root / "receipts.pub": as_text([ReceiptSigner(seed).public_key]).encode(),
-        }
-        for node in plan.nodes:
-            files |= _node_files(root / "nodes" / node.name, node, plan, keys, ca, issued=issued)
-        write_all_private(files)
-        servers = tuple(f"tls://{node.host}:{node.port}" for node in plan.nodes)
-        directory.write(HubRecord(plan.fleet, servers, replicas=len(plan.nodes), issued=issued))
 
 
 async def apply(directory: HubDirectory, limits: streams.StreamLimits | None = None) -> list[str]:
@@ -192,46 +118,6 @@ async def push_revocations(directory: HubDirectory) -> None:
     """
     with directory.locked():
         await _push_accounts(directory, directory.read())
-
-
-def refresh_nodes(directory: HubDirectory) -> list[str]:
-    """Writes all revocations into the servers' configuration, as far as it is in the directory.
-
-    A server reads it when it starts, and believes what is newer, it or its own disk: one that starts with an
-    empty disk knows nothing else.
-
-    Returns:
-        Which files could not be changed, and why.
-
-    Raises:
-        UserError: the directory is not a hub's.
-    """
-    nodes = directory.path / "nodes"
-    with directory.locked():
-        record = directory.read()
-        tokens = _account_tokens(_keys(directory), record.fleet, record.revoked, record.issued or _now_s())
-        try:
-            paths = sorted(each / "nats.conf" for each in nodes.iterdir())
-        except FileNotFoundError:
-            return []  # The servers have them, and no one else.
-        except OSError as error:
-            return [f"{nodes} can't be read: {error.strerror}"]
-        return [problem for path in paths if (problem := _refresh(path, tokens))]
-
-
-def _refresh(path: Path, tokens: Mapping[str, str]) -> str | None:
-    """Changes one server's configuration; returns why that failed."""
-    try:
-        text = with_accounts(path.read_text(encoding="utf-8"), tokens)
-        # For a container it belongs to the server, not to the administrator.
-        write_private(path, text.encode(), keep_owner=True)
-    except OSError as error:
-        return f"{path} can't be read: {error.strerror}"
-    except ValueError as error:
-        return f"{path} is not as init makes it: {error}"
-    except UserError as error:
-        return error.what
-    return None
 
 
 @dataclass(frozen=True, slots=True)
@@ -341,68 +227,6 @@ def receiver_files(directory: HubDirectory, name: str, out: Path, *, days: float
         )
 
 
-_KEYS: Final[dict[KeyName, KeyKind]] = {
-    "operator": KeyKind.OPERATOR,
-    "fleet": KeyKind.ACCOUNT,
-    "robots": KeyKind.ACCOUNT,
-    "system": KeyKind.ACCOUNT,
-}
-
-
-def _keys(directory: HubDirectory) -> dict[KeyName, Key]:
-    return {name: directory.key(name) for name in _KEYS}
-
-
-def _account_tokens(
-    keys: Mapping[KeyName, Key], fleet: str, revoked: Mapping[str, int], issued: int
-) -> dict[str, str]:
-    """Returns the tokens of the three accounts, by public key."""
-    # A key is never used again, so whatever it has signed is revoked, also by a clock that was ahead.
-    revoked = dict.fromkeys(revoked, _END_OF_TIME_S)
-    services = permissions.SERVICES
-    fleet_key = keys["fleet"].public
-    accounts = {
-        "system": Account("system"),
-        "fleet": Account(fleet, stores=True, exports=services, revoked=revoked),
-        "robots": Account(
-            f"{fleet} robots", imports=tuple((fleet_key, each) for each in services), revoked=revoked
-        ),
-    }
-    named = {name: keys[name] for name in _ACCOUNTS}
-    return {
-        key.public: account_jwt(keys["operator"], key.public, accounts[name], issued_unix_s=issued)
-        for name, key in named.items()
-    }
-
-
-_ACCOUNTS: Final[tuple[KeyName, ...]] = ("system", "fleet", "robots")
-_END_OF_TIME_S: Final = 253_402_300_799
-"""The last second of the year 9999: servers refuse tokens that were issued until then."""
-
-
-def _node_files(
-    out: Path, node: Node, plan: HubPlan, keys: Mapping[KeyName, Key], ca: KeyPair, *, issued: int
-) -> dict[Path, bytes]:
-    certificate = issue_node_certificate(ca, node.name, [node.host, "localhost", "127.0.0.1"], _CA_DAYS)
-    operator = keys["operator"]
-    text = server_config(
-        node,
-        plan.nodes,
-        operator=operator_jwt(operator, f"{plan.fleet} hub", keys["system"].public),
-        system_account=keys["system"].public,
-        accounts=_account_tokens(keys, plan.fleet, {}, issued),
-        places=plan.places,
-        max_store=plan.max_store,
-        sync_always=plan.sync_always,
-    )
-    return {
-        out / "nats.conf": text.encode(),
-        out / "ca.pem": ca.certificate,
-        out / "server.pem": certificate.certificate,
-        out / "server.key": certificate.key,
-    }
-
-
 def _issue(
     directory: HubDirectory,
     kind: Kind,
@@ -413,8 +237,7 @@ def _issue(
     again: bool,
 ) -> tuple[HubRecord, Credentials]:
     """Makes a user's credentials; returns them with the record that lists it."""
-    if not names.ROBOT_NAME.fullmatch(name):
-        raise _no_name(name)
+    check_name(name)
     record = directory.read()
     old = record.user(kind, name)
     if old is not None and not again:
@@ -443,7 +266,7 @@ async def _push_accounts(directory: HubDirectory, record: HubRecord) -> None:
     # down would otherwise bring the others its older tokens, and with them who has been revoked meanwhile.
     record = replace(record, issued=max(_now_s(), record.issued + 1))
     directory.write(record)
-    tokens = _account_tokens(_keys(directory), record.fleet, record.revoked, record.issued)
+    tokens = account_tokens(account_keys(directory), record.fleet, record.revoked, record.issued)
     async with _connected(directory, system=True) as hub:
         for token in tokens.values():
             answer = await hub.request("$SYS.REQ.CLAIMS.UPDATE", token.encode(), _PUSH_WITHIN_S)
@@ -486,11 +309,3 @@ def _fragment(record: HubRecord, more: str = "") -> bytes:
     """Returns what a configuration file needs of the hub; names and addresses need no quotes in YAML."""
     servers = "".join(f"  - {server}\n" for server in record.servers)
     return f"servers:\n{servers}{more}fleet: {record.fleet}\n".encode()
-
-
-def _no_name(name: str) -> UserError:
-    return UserError(
-        f"'{name[:80]}' is no name for a robot, person or fleet",
-        "Write lower-case letters, digits and hyphens, at most 63, as in DNS names",
-        exit_code=ExitCode.USAGE,
-    )

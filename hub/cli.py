@@ -16,6 +16,8 @@ from fleet.connection import FleetAddress
 from fleet.errors import HubError, HubReason
 from fleet.servers import exposed_server
 from hub import administration
+from hub.accounts import refresh_nodes
+from hub.creation import HubPlan, create
 from hub.directory import HubDirectory, Kind
 from hub.receiver.cli import receiver
 from hub.server_config import Node, Places
@@ -59,14 +61,14 @@ def init(
             "Type: robot-bridge hub init --nodes 3 --host hub1 --host hub2 --host hub3",
             exit_code=ExitCode.USAGE,
         )
-    plan = administration.HubPlan(
+    plan = HubPlan(
         fleet=fleet,
         nodes=tuple(Node(f"n{position}", name) for position, name in enumerate(hosts, 1)),
         places=Places(),
         max_store=store,
         sync_always=not old_server,
     )
-    administration.create(HubDirectory(out), plan)
+    create(HubDirectory(out), plan)
     typer.echo(f"{out}: created the keys of the fleet '{fleet}'. Keep it secret, and keep a backup.")
     for node in plan.nodes:
         typer.echo(f"Copy {out}/nodes/{node.name} to {node.host} as /etc/nats, and start nats-server there.")
@@ -284,7 +286,7 @@ def _end_old(hub: HubDirectory, *, again: bool) -> None:
 
 def _refresh_nodes(hub: HubDirectory) -> None:
     """Writes the revocations into the servers' configuration in the directory; says where that failed."""
-    for problem in administration.refresh_nodes(hub):
+    for problem in refresh_nodes(hub):
         typer.echo(
             f"{problem}. It lacks revocations: when its server has lost its disk, type"
             f"  robot-bridge hub apply --dir {hub.path}",

@@ -24,6 +24,7 @@ from common.errors import ExitCode, UserError
 from common.private_files import directory_lock, write_private
 from fleet.connection import FleetAddress
 from fleet.identity import Key
+from fleet.names import ROBOT_NAME
 
 Kind = Literal["robot", "operator", "receiver"]
 KeyName = Literal["operator", "fleet", "robots", "system"]
@@ -74,6 +75,16 @@ class HubRecord:
         """Returns the record with this user in the place of the one with the same kind and name."""
         others = (each for each in self.users if (each.kind, each.name) != (user.kind, user.name))
         return replace(self, users=(*others, user))
+
+
+def check_name(name: str) -> None:
+    """Raises a UserError (usage) if a fleet, robot, person or receiver can't have this name."""
+    if not ROBOT_NAME.fullmatch(name):
+        raise UserError(
+            f"'{name[:80]}' is no name for a robot, person or fleet",
+            "Write lower-case letters, digits and hyphens, at most 63, as in DNS names",
+            exit_code=ExitCode.USAGE,
+        )
 
 
 class HubDirectory:

@@ -98,7 +98,7 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
             for name in ("incoming", "names", "reading", "standing")
         ),
         ("bridge/", ("console.cli", "console.fleet", "console.monitor", "console.window", "console.viewer")),
-        ("hub/exporter/", ("hub.receiver", "hub.administration", "boto3")),
+        ("hub/exporter/", ("hub.receiver", "hub.administration", "hub.creation", "boto3")),
         ("console/fleet/", (*HEAVY, "grpc", "nats", "nkeys", "typer", "rich", "console.cli")),
         *(
             (f"console/fleet/{name}.py", ("asyncio", "time", "google.protobuf", "omniseer"))

@@ -9,7 +9,7 @@ from pathlib import Path
 from fleet.connection import FleetAddress
 from fleet.names import inbox_prefix
 from hub import administration
-from hub.administration import HubPlan
+from hub.creation import HubPlan, create
 from hub.directory import HubDirectory
 from hub.server_config import Node, Places
 from tests.support.nats_servers import SERVER, NatsServers
@@ -32,7 +32,7 @@ class SecureHub:
         self.servers = NatsServers(directory, nodes, binary=binary, whole=self._text, scheme="tls")
         places = Places(listen=_LOOPBACK)
         self.plan = HubPlan("lab", self._nodes(), places, "64GB", sync_always=binary == SERVER)
-        administration.create(self.directory, self.plan)
+        create(self.directory, self.plan)
 
     def start(self) -> None:
         """Starts the servers, and makes the streams."""
