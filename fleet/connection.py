@@ -29,8 +29,9 @@ from fleet import consuming
 from fleet.consuming import Delivery, Start
 from fleet.errors import HubError, HubReason, RefusedError, UnreachableError, api_error, is_repeat
 from fleet.incoming import OPERATION
+from fleet.replies import NO_RESPONDERS, Message, NotTaken, parsed
 from fleet.serving import Handler, Service, serve_in
-from fleet.session import NO_RESPONDERS, Message, NotTaken, Session, parsed
+from fleet.session import Session
 
 __all__ = ["Delivery", "Entry", "FleetAddress", "Hub", "Link", "NotTaken", "Published", "Start", "connect"]
 

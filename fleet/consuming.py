@@ -12,7 +12,8 @@ from typing import Any, Final
 from common.backoff import Backoff
 from fleet.errors import HubError, HubReason
 from fleet.incoming import DESCRIPTION
-from fleet.session import NO_RESPONDERS, Message, Session, Waiter
+from fleet.replies import NO_RESPONDERS, Message, Waiter
+from fleet.session import Session
 
 _PULL_EXPIRES_S: Final = 20.0
 """A pull request waits this long at the hub for messages."""

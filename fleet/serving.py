@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from fleet import names
-from fleet.session import Message, Session
+from fleet.replies import Message
+from fleet.session import Session
 
 _ROUTED: Final = "_R_."
 """Reply subjects that the server makes for a request from another account; clients can't name such a one."""

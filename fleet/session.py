@@ -10,9 +10,8 @@ import asyncio
 import base64
 import json
 import ssl
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import ParseResult
@@ -24,10 +23,11 @@ from nats.aio.transport import TcpTransport
 from nats.protocol.parser import AWAITING_CONTROL_LINE, PERMISSIONS_ERR, Parser
 
 from common.deadline import within
-from fleet.errors import HubError, HubReason, RefusedError, UnreachableError, api_error
+from fleet.errors import HubError, HubReason, RefusedError, UnreachableError
 from fleet.identity import Credentials
-from fleet.incoming import STATUS, read_headers, read_reply, read_subject
+from fleet.incoming import read_headers, read_reply, read_subject
 from fleet.names import LARGEST_MESSAGE
+from fleet.replies import MAX_WAITING, MAX_WAITING_MESSAGES, NO_RESPONDERS, Message, NotTaken, Waiter, parsed
 
 CONNECT_TIMEOUT_S: Final = 5.0
 """For one server: name resolution, TCP, TLS and authentication."""
@@ -38,44 +38,6 @@ _MAX_MESSAGE: Final = 4 * 1024 * 1024
 """Longest message that is read, in bytes; the hub's max_payload is 1 MiB."""
 _MAX_CONTROL_LINE: Final = 64 * 1024
 """Longest line of the protocol, in bytes; the longest of an honest server is INFO, of some KiB."""
-_MAX_WAITING: Final = 8 * 1024 * 1024
-"""Bytes that may wait in one subscription, or for one caller."""
-_MAX_WAITING_MESSAGES: Final = 4096
-NO_RESPONDERS: Final = "503"
-
-
-@dataclass(frozen=True, slots=True)
-class Message:
-    """A message from the hub."""
-
-    subject: str
-    payload: bytes
-    headers: Mapping[str, str]
-    reply: str
-
-    @property
-    def status(self) -> str:
-        """JetStream's status code of a message without content, as "404"; empty for an ordinary one."""
-        return self.headers.get(STATUS, "")
-
-    @property
-    def size(self) -> int:
-        """Bytes of the payload, and characters of what is kept besides it."""
-        headers = sum(len(name) + len(value) for name, value in self.headers.items())
-        return len(self.payload) + len(self.subject) + len(self.reply) + headers
-
-
-@dataclass(slots=True)
-class NotTaken:
-    """What was not taken of the messages that a hub has sent.
-
-    Attributes:
-        unreadable: headers, subjects and reply subjects that are no text or exceed their bounds.
-        dropped: messages beyond what may wait to be read.
-    """
-
-    unreadable: int = 0
-    dropped: int = 0
 
 
 class _BoundedParser(Parser):
@@ -222,47 +184,6 @@ class _Client(Client):
         size: Any = self._max_payload  # As the server has it.
         if not isinstance(size, int):
             raise UnreachableError("its greeting names no size of messages")
-
-
-class Waiter:
-    """Where the replies to one request arrive."""
-
-    def __init__(self, subject: str, not_taken: NotTaken | None = None) -> None:
-        self.subject = subject
-        self.replies: asyncio.Queue[Message | HubError] = asyncio.Queue()
-        self._not_taken = not_taken or NotTaken()
-        self._bytes = 0
-
-    def take(self, message: Message) -> None:
-        """Keeps a message until it is read; beyond the bounds it is dropped."""
-        size = self._bytes + message.size
-        if self.replies.qsize() < _MAX_WAITING_MESSAGES and size <= _MAX_WAITING:
-            self._bytes = size
-            self.replies.put_nowait(message)
-        else:
-            self._not_taken.dropped += 1
-
-    def refuse(self, error: HubError) -> None:
-        """Has an error raised when all before it has been read; one is enough, and a server may send more."""
-        if self.replies.qsize() < _MAX_WAITING_MESSAGES:
-            self.replies.put_nowait(error)
-
-    async def get(self, timeout_s: float) -> Message:
-        """Returns the next one.
-
-        Raises:
-            HubError: there is none in time, or the connection is lost.
-        """
-        try:
-            async with asyncio.timeout(timeout_s):
-                reply = await self.replies.get()
-        except TimeoutError as error:
-            text = f"no answer from the hub within {timeout_s:g} s"
-            raise HubError(HubReason.TIMEOUT, text) from error
-        if isinstance(reply, HubError):
-            raise reply
-        self._bytes -= reply.size
-        return reply
 
 
 class Session:
@@ -505,27 +426,9 @@ def _too_large(payload: bytes) -> HubError:
 
 
 _BOUNDS: Final[dict[str, Any]] = {
-    "pending_msgs_limit": _MAX_WAITING_MESSAGES,
-    "pending_bytes_limit": _MAX_WAITING,
+    "pending_msgs_limit": MAX_WAITING_MESSAGES,
+    "pending_bytes_limit": MAX_WAITING,
 }
-
-
-def parsed(payload: bytes) -> dict[str, Any]:
-    """Parses an answer of JetStream.
-
-    Raises:
-        HubError: it is an error, or no JSON object.
-    """
-    try:
-        answer = json.loads(payload)
-    # Deep nesting is a RecursionError.
-    except (ValueError, RecursionError) as error:
-        raise HubError(HubReason.INVALID, "the hub's answer is no JSON") from error
-    if not isinstance(answer, dict):
-        raise HubError(HubReason.INVALID, "the hub's answer is no JSON object")
-    if "error" in answer:
-        raise api_error(answer["error"])
-    return answer
 
 
 def _sign(client: _Client, creds: Credentials, nonce: str, *, encrypted: bool) -> bytes:

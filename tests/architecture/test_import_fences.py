@@ -97,6 +97,7 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
             (f"fleet/{name}.py", ("nats", "nkeys", "asyncio"))
             for name in ("incoming", "names", "reading", "standing")
         ),
+        ("fleet/replies.py", ("nats", "nkeys", "fleet.session", "fleet.connection")),
         ("bridge/", ("console.cli", "console.fleet", "console.monitor", "console.window", "console.viewer")),
         ("hub/exporter/", ("hub.receiver", "hub.administration", "hub.creation", "boto3")),
         ("console/fleet/", (*HEAVY, "grpc", "nats", "nkeys", "typer", "rich", "console.cli")),

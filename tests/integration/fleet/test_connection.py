@@ -12,8 +12,9 @@ from fleet import names
 from fleet.connection import FleetAddress, Published, Start, connect
 from fleet.consuming import pull
 from fleet.errors import HubError, HubReason, UnreachableError
+from fleet.replies import Message
 from fleet.serving import Request
-from fleet.session import Message, Session
+from fleet.session import Session
 from hub import streams
 from tests.support.free import free_tcp_port
 from tests.support.nats_servers import NatsServers, nats_servers

@@ -8,7 +8,8 @@ import pytest
 from fleet.connection import FleetAddress, connect
 from fleet.consuming import pull
 from fleet.errors import HubError, HubReason, UnreachableError
-from fleet.session import Message, NotTaken, Session
+from fleet.replies import Message, NotTaken
+from fleet.session import Session
 from tests.support.eventually import eventually
 from tests.support.hostile_nats_server import INFO, HostileServer, hostile_server
 

@@ -6,7 +6,7 @@ import pytest
 
 from fleet.consuming import delivery
 from fleet.errors import HubError, HubReason, RefusedError, api_error
-from fleet.session import Message, NotTaken, Waiter, parsed
+from fleet.replies import Message, NotTaken, Waiter, parsed
 
 
 @pytest.mark.parametrize(

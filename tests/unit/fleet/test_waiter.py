@@ -3,7 +3,7 @@
 import pytest
 
 from fleet.errors import HubError, HubReason, UnreachableError
-from fleet.session import Message, Waiter
+from fleet.replies import Message, Waiter
 
 
 def _message(size: int) -> Message:
