@@ -96,8 +96,9 @@ def test_one_without_a_cable_that_reports_nothing_new_is_released_until_it_was_u
         device.input = held
         wait_until(lambda: reader.steering() is not None, "it holds")
         assert not reader.problem()
-        wait_until(lambda: reader.steering() is None, "it is released", HELD_FOR_S + 1.0)
-        assert "2 s" in reader.problem()
+        # Without a problem it may be the machine that has held the reading thread up for a moment.
+        wait_until(lambda: "2 s" in reader.problem(), "it is released", HELD_FOR_S + 1.0)
+        assert reader.steering() is None
         device.input = replace(held, values=(2,))
         wait_until(lambda: not reader.problem(), "it reports again")
         assert reader.steering() is None
