@@ -12,6 +12,7 @@ from typing import Final
 
 import grpc
 
+from common.addresses import bracketed
 from common.errors import UserError
 
 _MAX_SOCKET_PATH: Final = 107
@@ -80,11 +81,6 @@ def _unix_socket(path: Path, kind: int) -> socket.socket:
         listener.close()
         raise UserError(f"socket {path} can't be bound ({error})", "Choose another path") from error
     return listener
-
-
-def bracketed(host: str) -> str:
-    """Returns the host as it precedes ":PORT": an IPv6 address in brackets (RFC 3986 3.2.2)."""
-    return f"[{host}]" if ":" in host and not host.startswith("[") else host
 
 
 def _try_tcp(host: str, port: int) -> None:

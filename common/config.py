@@ -56,6 +56,9 @@ class Settings(BaseSettings):
         """Returns the sources in order of precedence: the environment, then the file."""
         return env_settings, init_settings
 
+    def check(self) -> None:
+        """Raises a `SettingsConflictError` where values are valid each, but not together."""
+
 
 SettingsT = TypeVar("SettingsT", bound=Settings)
 
@@ -84,7 +87,7 @@ def load(
     Args:
         settings_type: what it is read into.
         path: the file.
-        checks: of the whole; they raise `SettingsConflictError`.
+        checks: more than the settings' own `check`; they raise `SettingsConflictError`.
 
     Raises:
         UserError: the file can't be read, is not YAML, or has an unknown key, a key twice or a wrong value.
@@ -113,6 +116,7 @@ def load(
             remedy,
         ) from error
     try:
+        settings.check()
         for check in checks:
             check(settings)
     except SettingsConflictError as error:

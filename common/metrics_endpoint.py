@@ -10,7 +10,7 @@ from contextlib import asynccontextmanager, suppress
 from http import HTTPStatus
 from typing import Final
 
-from common.bind import bracketed
+from common.addresses import bracketed
 from common.errors import ExitCode, UserError
 
 _log = logging.getLogger(__name__)

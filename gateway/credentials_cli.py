@@ -9,6 +9,7 @@ from typing import Annotated, Any, Final, TypeAlias
 
 import typer
 
+from common.addresses import is_loopback
 from common.errors import ExitCode, UserError
 from common.private_files import write_private
 from gateway.access.command import credentials_command
@@ -16,7 +17,7 @@ from gateway.access.credential import Credential, Kind
 from gateway.access.credential_admin import CredentialAdmin, CredentialRequest, Issued
 from gateway.access.directory import CredentialDirectory
 from gateway.access.role import Role
-from gateway.config import CONFIG_VARIABLE, GatewaySettings, is_loopback, load_settings
+from gateway.config import CONFIG_VARIABLE, GatewaySettings, load_settings
 from gateway.platform.hosts import find_hosts, with_loopback
 
 app = typer.Typer(help="Manage who may call this robot.", no_args_is_help=True)

@@ -11,10 +11,11 @@ from typing import Any, Final, NoReturn
 
 from common import bind, heartbeat
 from common.metrics_endpoint import serving_metrics
+from common.metrics_settings import MetricsSettings
 from common.ros_node import OwnNode, ros_node
 from common.tasks import cancel
 from tap.camera import Graph
-from tap.config import MetricsSettings, TapSettings
+from tap.config import TapSettings
 from tap.connection import Connection
 from tap.metrics import TapMetrics
 from tap.totals import Totals

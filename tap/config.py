@@ -6,16 +6,10 @@ from typing import Literal
 from pydantic import Field
 from pydantic_settings import SettingsConfigDict
 
-from common.config import Section, Settings
+from common.config import Settings
+from common.metrics_settings import MetricsSettings, check_metrics
 
 MAX_FPS = 120
-
-
-class MetricsSettings(Section):
-    """Prometheus metrics; off unless there is a port."""
-
-    host: str = "127.0.0.1"
-    port: int | None = Field(default=None, ge=0, le=65535)
 
 
 class TapSettings(Settings):
@@ -31,3 +25,7 @@ class TapSettings(Settings):
     max_fps: int = Field(default=60, ge=1, le=MAX_FPS)
     """Frames per second of each camera that are taken at the most; of more, the newest ones."""
     metrics: MetricsSettings = MetricsSettings()
+
+    def check(self) -> None:
+        """Raises a SettingsConflictError if others on the network could read the metrics, and may not."""
+        check_metrics(self.metrics)

@@ -3,7 +3,7 @@
 from gateway.config.faults import FaultSettings
 from gateway.config.links import PreviewSettings, TeleopSettings
 from gateway.config.security import AuditSettings, SecuritySettings, TlsSettings
-from gateway.config.serving import GrpcSettings, LimitSettings, MetricsSettings, is_loopback
+from gateway.config.serving import GrpcSettings, LimitSettings
 from gateway.config.settings import (
     CONFIG_VARIABLE,
     GatewaySettings,
@@ -21,14 +21,12 @@ __all__ = [
     "GatewaySettings",
     "GrpcSettings",
     "LimitSettings",
-    "MetricsSettings",
     "PlatformSettings",
     "PreviewSettings",
     "SecuritySettings",
     "SourceSettings",
     "TeleopSettings",
     "TlsSettings",
-    "is_loopback",
     "load_settings",
     "without_effect",
 ]

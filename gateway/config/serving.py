@@ -1,4 +1,4 @@
-"""`grpc`, `limits`, `metrics`: where the gateway serves, and how much it serves to one caller."""
+"""`grpc`, `limits`, `discovery`: where the gateway serves, and how much it serves to one caller."""
 
 import ipaddress
 from pathlib import Path
@@ -58,23 +58,3 @@ class DiscoverySettings(Section):
             except ValueError:
                 raise ValueError("addresses of this machine, [10.0.0.7] for example") from None
         return addresses
-
-
-class MetricsSettings(Section):
-    """The Prometheus endpoint: unencrypted and without authentication."""
-
-    host: str = Field(default="127.0.0.1", min_length=1)
-    port: int | None = Field(default=None, ge=0, le=65535)
-    """None disables it; 0 takes any free port, which the log names."""
-    insecure: bool = False
-    """Accepts that others on the network can read the metrics; required for any address but loopback."""
-
-
-def is_loopback(host: str) -> bool:
-    """Returns whether only this machine can reach the address. Names other than localhost count as public."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host.strip("[]")).is_loopback
-    except ValueError:
-        return False

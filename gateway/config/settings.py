@@ -8,7 +8,9 @@ from typing import Final, Literal
 from pydantic import Field
 from pydantic_settings import SettingsConfigDict
 
+from common.addresses import is_loopback
 from common.config import Section, Settings, SettingsConflictError, load
+from common.metrics_settings import MetricsSettings, check_metrics
 from gateway.config.faults import FaultSettings
 from gateway.config.generic_sources import MOST_GENERIC
 from gateway.config.links import BridgeSettings, PreviewSettings, RecordingSettings, TeleopSettings
@@ -17,8 +19,6 @@ from gateway.config.serving import (
     DiscoverySettings,
     GrpcSettings,
     LimitSettings,
-    MetricsSettings,
-    is_loopback,
 )
 from gateway.config.sources import DEFAULT_SOURCES, SourceSettings
 from gateway.status.faults.known import ANY_WORD, known_faults, matches
@@ -64,6 +64,13 @@ class GatewaySettings(Settings):
     sources: tuple[SourceSettings, ...] = DEFAULT_SOURCES
     """An empty list makes a gateway that needs no ROS."""
 
+    def check(self) -> None:
+        """Raises a `SettingsConflictError` where values are valid each, but not together."""
+        _check_exposure(self)
+        _check_discovery(self)
+        _check_driving(self)
+        _check_sources(self)
+
     def encrypts_preview(self, address: str) -> bool:
         """Returns whether the stream of a listener has a passphrase.
 
@@ -96,9 +103,7 @@ def load_settings(path: Path | None, *checks: Callable[[GatewaySettings], None])
     Raises:
         UserError: it can't be read, or something in it is wrong.
     """
-    return load(
-        GatewaySettings, path, _check_exposure, _check_discovery, _check_driving, _check_sources, *checks
-    )
+    return load(GatewaySettings, path, *checks)
 
 
 def without_effect(settings: GatewaySettings) -> Iterator[str]:
@@ -126,14 +131,7 @@ def _check_exposure(settings: GatewaySettings) -> None:
             "Authenticate callers ('robot-gateway credentials init' explains how), use 127.0.0.1 "
             "and a tunnel, or accept it with 'security: {insecure: true}'",
         )
-    metrics = settings.metrics
-    open_metrics = metrics.port is not None and not is_loopback(metrics.host)
-    if open_metrics and not metrics.insecure:
-        raise SettingsConflictError(
-            ("metrics", "host"),
-            f"metrics.host is {metrics.host}: anyone on that network could read the metrics",
-            "Use 127.0.0.1, or accept it with 'metrics: {insecure: true}'",
-        )
+    check_metrics(settings.metrics)
 
 
 def _check_discovery(settings: GatewaySettings) -> None:

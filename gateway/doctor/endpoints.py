@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from common.bind import bracketed
+from common.addresses import bracketed
 from common.findings import Finding, good, note, wrong
 from common.start_command import start_command
 

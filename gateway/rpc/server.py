@@ -11,7 +11,8 @@ from grpc_health.v1.health import SERVICE_NAME as HEALTH_SERVICE
 from grpc_reflection.v1alpha.reflection import SERVICE_NAME as REFLECTION_SERVICE
 from grpc_reflection.v1alpha.reflection import enable_server_reflection
 
-from common.bind import bind_tcp, bind_unix, bracketed
+from common.addresses import bracketed
+from common.bind import bind_tcp, bind_unix
 from common.grpc_errors import ErrorInterceptor
 from common.health import Health
 from common.interceptors import Behavior, Chain

@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 from pydantic_settings import SettingsConfigDict
 
 from common.config import Section, Settings
+from common.metrics_settings import MetricsSettings, check_metrics
 from fleet.servers import exposed_server
 
 _Name = Annotated[str, Field(pattern=r"^[a-z0-9]([a-z0-9-]{0,61}[a-z0-9])?$")]
@@ -49,14 +50,6 @@ class StoreSettings(Section):
     """Whether the bucket is in the path of a URL, not in its host."""
 
 
-class MetricsSettings(Section):
-    """Where Prometheus reads the metrics."""
-
-    host: str = "127.0.0.1"
-    port: int | None = Field(default=None, ge=0, le=65535)
-    """None: no metrics are served."""
-
-
 class ReceiverSettings(Settings):
     """All settings of a receiver."""
 
@@ -77,3 +70,7 @@ class ReceiverSettings(Settings):
     metrics: MetricsSettings = MetricsSettings()
     log_level: Literal["debug", "info", "warning", "error"] = "info"
     log_format: Literal["human", "json"] = "human"
+
+    def check(self) -> None:
+        """Raises a SettingsConflictError if others on the network could read the metrics, and may not."""
+        check_metrics(self.metrics)

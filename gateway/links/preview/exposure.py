@@ -2,9 +2,9 @@
 
 import logging
 
-from common.bind import bracketed
+from common.addresses import bracketed, is_loopback
 from common.findings import Finding, Verdict, good, note
-from gateway.config import GatewaySettings, is_loopback
+from gateway.config import GatewaySettings
 from gateway.status.preview import Listener
 from gateway.status.snapshot import Snapshot
 

@@ -2,7 +2,7 @@
 
 from dataclasses import asdict
 
-from common.bind import bracketed
+from common.addresses import bracketed
 from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.mapping.enums import CAMERA_STATES, CODECS, PREVIEW_STATES, PROFILES, delivery_from
 from gateway.rpc.mapping.freshness import freshness_fields

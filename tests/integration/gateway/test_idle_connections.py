@@ -14,7 +14,8 @@ import pytest
 from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
 from grpc_health.v1.health_pb2_grpc import HealthStub
 
-from common.bind import bind_tcp, bracketed
+from common.addresses import bracketed
+from common.bind import bind_tcp
 from common.healthcheck import state_of
 from common.reasons import Reason
 from common.rpc import new_server

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from grpc.aio import Server
 
-from common.bind import bind_tcp, bind_unix, bracketed
+from common.bind import bind_tcp, bind_unix
 from common.errors import UserError
 from common.rpc import new_server
 
@@ -104,12 +104,3 @@ async def test_a_directory_without_the_right_to_write_is_named(server: Server, t
 async def test_a_path_that_linux_can_not_take_is_measured(server: Server, tmp_path: Path) -> None:
     with pytest.raises(UserError, match="Linux takes 107"):
         bind_unix(server, tmp_path / ("x" * 120))
-
-
-def test_only_ipv6_is_bracketed() -> None:
-    assert [bracketed(host) for host in ("::1", "[::1]", "10.0.0.1", "robot")] == [
-        "[::1]",
-        "[::1]",
-        "10.0.0.1",
-        "robot",
-    ]
