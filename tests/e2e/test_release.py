@@ -32,8 +32,8 @@ def repository(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def made(repository: Path) -> Path:
-    """A release, at the path where it is by default."""
-    ended = release(repository, "--without-images", "--python", PYTHON)
+    """A release for all Pythons, at the path where it is by default."""
+    ended = release(repository, "--without-images")
     assert ended.returncode == 0, ended.stderr
     directory = repository / f"build/robot-gateway-{VERSION}"
     assert ended.stderr.splitlines()[-1] == f"release: {directory}"
@@ -51,9 +51,23 @@ def modules(wheel: Path) -> list[str]:
     return sorted(path.removesuffix("/__init__").replace("/", ".") for path in paths)
 
 
-def fresh_environment(directory: Path, *options: str) -> Path:
-    subprocess.run(["/usr/bin/python3", "-m", "venv", *options, directory], check=True, timeout=120)
+def fresh_environment(directory: Path, *options: str, python: str | Path = "/usr/bin/python3") -> Path:
+    subprocess.run([python, "-m", "venv", *options, directory], check=True, timeout=120)
     return directory / "bin"
+
+
+def other_python(version: str) -> str:
+    """Returns the path of an interpreter of this version, where the machine has one."""
+    found = subprocess.run(
+        [ROOT / "scripts/test-python", "--find", version],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+    )
+    if found.returncode != 0:
+        pytest.skip(f"no Python {version} is here: {found.stderr.strip()}")
+    return found.stdout.strip()
 
 
 def test_two_releases_of_a_commit_are_the_same_bytes(made: Path, repository: Path, tmp_path: Path) -> None:
@@ -65,8 +79,6 @@ def test_two_releases_of_a_commit_are_the_same_bytes(made: Path, repository: Pat
         ended = release(
             other,
             "--without-images",
-            "--python",
-            PYTHON,
             "--output",
             output,
             environment={"TZ": "Asia/Tokyo", "LC_ALL": "C"},
@@ -173,6 +185,26 @@ def test_the_client_installs_and_imports_without_network_gstreamer_and_qt(made: 
     )
     assert tried.returncode == 0, tried.stderr
     assert not (tools / "robotctl").exists()
+
+
+@pytest.mark.parametrize("version", ["3.12", "3.13"])
+def test_robotctl_and_the_client_install_on_newer_pythons(made: Path, version: str, tmp_path: Path) -> None:
+    """Without network; video needs GStreamer's Python side, which is of the system's Python."""
+    tools = fresh_environment(tmp_path / "environment", python=other_python(version))
+    installed = alone(
+        *(tools / "pip", "install", "--no-index", "--find-links", made / "wheels"),
+        f"robot-gateway-console=={VERSION}",
+    )
+    assert installed.returncode == 0, installed.stderr
+    tried = alone(
+        *(tools / "python", "-c", IMPORT_ALL),
+        *(json.dumps(each) for each in (modules(made / "wheels" / WHEELS[0]), ["gi", "PySide6"])),
+    )
+    assert tried.returncode == 0, tried.stderr
+    assert alone(tools / "robotctl", "--version").stdout.startswith(f"robotctl {VERSION}")
+    refused = alone(tools / "robotctl", "--target", "127.0.0.1:1", "status")
+    assert refused.returncode == 3
+    assert "no robot gateway reached" in refused.stderr
 
 
 def test_robotctl_installs_and_works_without_network(made: Path, tmp_path: Path) -> None:
