@@ -316,7 +316,8 @@ class PreviewSettings(Settings):
         for name, source in cameras.items():
             if not isinstance(source, V4l2Source):
                 continue
-            key = ("card", source.card) if source.card else ("device", source.device)
+            # A camera has several names below /dev/v4l, links to the one node.
+            key = ("card", source.card) if source.card else ("device", os.path.realpath(source.device))
             if key in taken:
                 raise ValueError(
                     f"{taken[key]} and {name} name the same {' '.join(key)}, which is one device;"

@@ -150,6 +150,15 @@ def test_cameras_that_contradict_themselves_are_refused(tmp_path: Path, text: st
         from_text(tmp_path, text)
 
 
+def test_one_device_under_two_names_is_one_device(tmp_path: Path) -> None:
+    node, link = tmp_path / "video11", tmp_path / "usb-video-index0"
+    node.touch()
+    link.symlink_to(node.name)
+    text = f"cameras: {{front: {{kind: v4l2, device: {node}}}, rear: {{kind: v4l2, device: {link}}}}}"
+    with pytest.raises(UserError, match=f"front and rear name the same device {node}, which is one device"):
+        from_text(tmp_path, text)
+
+
 def test_a_topic_is_a_source_by_its_full_name(tmp_path: Path) -> None:
     settings = from_text(tmp_path, "cameras: {arm: {kind: ros, topic: /arm/image_raw}}")
     assert settings.cameras["arm"] == RosSource(topic="/arm/image_raw")
