@@ -21,14 +21,18 @@ from tests.support.driven_robot import TELEOP, driven_base
 from tests.support.free import free_domain, free_tcp_port, free_udp_port
 from tests.support.heard import Base
 from tests.support.nats_servers import NatsServers, nats_servers
+from tests.support.ros_camera import ros_camera
 from tests.support.running_bridge import bridge_program, prepare
 from tests.support.running_drive import RunningDrive
 from tests.support.running_recorder import recorder_program
+from tests.support.running_tap import RunningTap
 from tests.support.waiting import wait_until
 
 LATENCY_MS: Final = 20
-STEADY, PASSING = "steady", "passing"
-"""Cameras: one that stays, and one that ends every few seconds, as if it were unplugged."""
+STEADY, PASSING, ARM = "steady", "passing", "arm"
+"""Cameras: one that stays, one that ends every few seconds, as if it were unplugged, and one that is a ROS
+topic."""
+_ARM_TOPIC: Final = "/arm/image_raw"
 _PASSING_FRAMES: Final = 90
 _UP_WITHIN_S: Final = 60.0
 
@@ -83,11 +87,14 @@ def deployment() -> Iterator[Deployment]:
         }
         stack.enter_context(patch.dict(os.environ, environment))
         base, drive = stack.enter_context(driven_base(directory))
-        tap, udp, tcp = str(directory / "tap.sock"), free_udp_port(), free_tcp_port()
+        stack.enter_context(ros_camera(_ARM_TOPIC))
+        (directory / "camera-tap").mkdir()
+        tap = stack.enter_context(RunningTap(directory / "camera-tap"))
+        encoded, udp, tcp = str(directory / "video-tap.sock"), free_udp_port(), free_tcp_port()
         preview = stack.enter_context(
-            serving("robot-preview", directory, _preview_settings(directory, udp, tap))
+            serving("robot-preview", directory, _preview_settings(directory, udp, encoded, str(tap.socket)))
         )
-        recorder = stack.enter_context(recorder_program(directory, video={"socket": tap}))
+        recorder = stack.enter_context(recorder_program(directory, video={"socket": encoded}))
         hub = stack.enter_context(nats_servers(directory / "hub"))
         asyncio.run(prepare(hub.urls))
         bridge = stack.enter_context(bridge_program(directory, tcp, hub.urls))
@@ -106,6 +113,7 @@ def deployment() -> Iterator[Deployment]:
             "robot-gateway": gateway,
             "robot-preview": preview,
             "robot-drive": drive.process,
+            "robot-tap": tap.process,
             "robot-recorder": recorder.process,
             "robot-bridge": bridge.process,
         }
@@ -113,6 +121,7 @@ def deployment() -> Iterator[Deployment]:
             "robot-gateway": directory / "robot-gateway.log",
             "robot-preview": directory / "robot-preview.log",
             "robot-drive": drive.log,
+            "robot-tap": tap.log,
             "robot-recorder": recorder.log,
             "robot-bridge": bridge.log,
         }
@@ -131,7 +140,7 @@ def deployment() -> Iterator[Deployment]:
         yield made
 
 
-def _preview_settings(directory: Path, port: int, tap: str) -> dict[str, Any]:
+def _preview_settings(directory: Path, port: int, video_tap: str, camera_tap: str) -> dict[str, Any]:
     # One frame after the other, then the end of the stream.
     passing = f"videotestsrc is-live=true num-buffers={_PASSING_FRAMES} ! video/x-raw,width=640,height=360"
     return {
@@ -139,10 +148,12 @@ def _preview_settings(directory: Path, port: int, tap: str) -> dict[str, Any]:
         "cameras": {
             STEADY: {"kind": "test"},
             PASSING: {"kind": "gst", "description": passing, "fallback": STEADY},
+            ARM: {"kind": "ros", "topic": _ARM_TOPIC},
         },
         "srt": {"bind": "127.0.0.1", "port": port, "latency_ms": LATENCY_MS},
         "encoders": {"order": ["x264"]},
-        "video_tap": {"socket": tap},
+        "video_tap": {"socket": video_tap},
+        "camera_tap": {"socket": camera_tap},
         "runtime_dir": str(directory / "preview-run"),
     }
 

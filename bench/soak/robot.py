@@ -17,7 +17,7 @@ import psutil
 
 from bench.progress import log
 from bench.rows import MeasurementError, Row
-from bench.soak.deployment import PASSING, STEADY, Deployment, deployment
+from bench.soak.deployment import ARM, PASSING, STEADY, Deployment, deployment
 from bench.soak.operators import come_and_go
 from bench.soak.readings import FEWEST_ROUNDS, Reading, judge_together
 from console.client import AsyncGatewayClient, GatewayClient, GatewayError, PreviewProfile, PreviewState
@@ -83,16 +83,17 @@ def one_round(robot: Deployment, profile: PreviewProfile, fault: "Fault") -> Non
 
 
 def _watch(robot: Deployment, client: GatewayClient, profile: PreviewProfile) -> None:
-    """One viewer stays while the camera changes to one that ends by itself."""
+    """One viewer stays while the camera changes to one that ends by itself, and to a ROS topic."""
     change = client.enable_preview(profile, camera=STEADY)
     assert change.preview.state is PreviewState.RUNNING, change.message
     try:
         with Receiver(robot.stream) as staying:
             staying.next_frame(FRAME_WITHIN_S)
-            client.enable_preview(camera=PASSING)
-            with Receiver(robot.stream) as passing:
-                passing.next_frame(FRAME_WITHIN_S)
-            staying.next_frame(FRAME_WITHIN_S)
+            for camera in (PASSING, ARM):
+                client.enable_preview(camera=camera)
+                with Receiver(robot.stream) as passing:
+                    passing.next_frame(FRAME_WITHIN_S)
+                staying.next_frame(FRAME_WITHIN_S)
     finally:
         client.disable_preview()
 

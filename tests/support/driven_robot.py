@@ -14,6 +14,8 @@ from console.client import (
     DrivePhase,
     DriveSession,
     GatewayError,
+    Refused,
+    StopLatch,
     Supervision,
 )
 from drive.config import DriveSettings
@@ -122,7 +124,12 @@ async def in_motion(client: AsyncGatewayClient, session: DriveSession, base: Bas
         if attempts % _ATTEMPT == 0:
             session.release()
             await _reset_after_a_loss(client)
-            await session.ready(within_s=15)
+            try:
+                await session.ready(within_s=15)
+            except Refused:
+                if not await _stop_by_a_loss(client):
+                    raise
+                return False  # Another worker was lost meanwhile.
         attempts += 1
         session.hold(speed_mps)
         return base.moves and session.state is not None and session.state.phase is DrivePhase.DRIVING
@@ -134,14 +141,20 @@ async def _reset_after_a_loss(client: AsyncGatewayClient) -> None:
     """Resets a stop that the drive program has made itself; one of a caller stays."""
 
     async def is_reset() -> bool:
-        stop = (await client.status()).teleop.stop
-        if stop is None or stop.by != LOST_BY:
+        stop = await _stop_by_a_loss(client)
+        if stop is None:
             return True
         with suppress(GatewayError):  # It is not known yet what else commands the robot.
             await client.reset_stop(stop.stop_id)
         return False
 
     await eventually(is_reset, bool, "the stop is reset that a lost worker has left", _IN_MOTION_WITHIN_S)
+
+
+async def _stop_by_a_loss(client: AsyncGatewayClient) -> StopLatch | None:
+    """Returns the stop that the drive program has made itself."""
+    stop = (await client.status()).teleop.stop
+    return stop if stop is not None and stop.by == LOST_BY else None
 
 
 @asynccontextmanager
