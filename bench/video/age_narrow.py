@@ -54,7 +54,7 @@ class _Kind:
     def what(self) -> str:
         """The link, for people."""
         rate = "adaptive" if self.adaptive else "fixed bit rate"
-        return f"HIGH_QUALITY through {LIMIT_KBPS} kbit/s with a queue of {self.queue_s:g} s, {rate}"
+        return f"high-quality through {LIMIT_KBPS} kbit/s with a queue of {self.queue_s:g} s, {rate}"
 
 
 KINDS: Final = (

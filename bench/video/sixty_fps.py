@@ -41,7 +41,7 @@ def rows(workdir: Path, wanted: set[str]) -> list[Row]:
     found = [
         Row(
             name="video.age_60_ms",
-            what="film at HIGH_QUALITY (720p60): due to decoded, median, by the viewer's own reckoning",
+            what="film at high-quality (720p60): due to decoded, median, by the viewer's own reckoning",
             unit="ms",
             values=ages_ms,
             bar=None,
