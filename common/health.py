@@ -6,7 +6,7 @@ it writes while it holds the lock that `set` needs, so one watcher that does not
 """
 
 from collections.abc import AsyncIterator
-from typing import Literal, TypeAlias
+from typing import Final, Literal, TypeAlias
 
 import grpc
 from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
@@ -15,8 +15,12 @@ from grpc_health.v1.health_pb2_grpc import HealthServicer, add_HealthServicer_to
 from common.broadcast import Broadcast
 from common.errors import UnknownServiceError
 from common.interceptors import RpcContext
+from common.printable import printable
 
 _Status: TypeAlias = Literal[0, 1, 2, 3]
+
+_QUOTED_CHARACTERS: Final = 64
+"""Of an unknown service's name, in its refusal: a request may have 256 KiB of it."""
 
 
 class Health(HealthServicer):
@@ -53,7 +57,8 @@ class Health(HealthServicer):
         """
         status = self._statuses.get(request.service)
         if status is None:
-            raise UnknownServiceError(f"the service '{request.service}' is unknown here")
+            name = printable(request.service[:_QUOTED_CHARACTERS])
+            raise UnknownServiceError(f"the service '{name}' is unknown here")
         return HealthCheckResponse(status=status)
 
     async def Watch(  # noqa: N802  # the schema names it

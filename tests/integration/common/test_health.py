@@ -65,6 +65,16 @@ async def test_an_unknown_service_is_not_found_with_the_reason_for_programs() ->
     assert refusal_in(caught.value.trailing_metadata()).reason == Reason.UNKNOWN_SERVICE
 
 
+async def test_the_refusal_quotes_the_printable_beginning_of_a_name() -> None:
+    """The defect: a name of 256 KiB came back whole, control characters included."""
+    async with serving(Health()) as target, grpc.aio.insecure_channel(target) as channel:
+        stub: Any = HealthStub(channel)  # its type has no methods
+        with pytest.raises(grpc.aio.AioRpcError) as caught:
+            await stub.Check(HealthCheckRequest(service="\x1b[2J" + 1000 * "n"))
+    assert caught.value.code() is grpc.StatusCode.NOT_FOUND
+    assert caught.value.details() == f"the service ' [2J{60 * 'n'}' is unknown here"
+
+
 async def test_watchers_learn_every_change_and_unknown_names_once_they_are_known() -> None:
     health = Health()
     async with serving(health) as target, grpc.aio.insecure_channel(target) as channel:
