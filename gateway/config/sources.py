@@ -38,6 +38,8 @@ _TOPIC: Final = re.compile(r"(~/|/)?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_
 """A topic name as rcl_validate_topic_name accepts it, without substitutions."""
 _LONGEST_TOPIC: Final = 247
 """RMW_TOPIC_MAX_NAME_LENGTH."""
+_LARGEST_IMAGE_PX: Final = 65_535
+"""Of a side: more than any camera has, and within the contract's uint32."""
 _TYPE: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]*/msg/[A-Za-z][A-Za-z0-9_]*")
 
 
@@ -77,9 +79,9 @@ class SourceSettings(Section):
     """Age from which the value is too old to rely on; the default depends on the kind."""
     required: bool = False
     """Whether the robot is degraded and not ready without this source."""
-    image_width_px: int = Field(default=1280, gt=0)
+    image_width_px: int = Field(default=1280, gt=0, le=_LARGEST_IMAGE_PX)
     """Width of the image that the boxes of detections refer to; the messages don't hold it."""
-    image_height_px: int = Field(default=720, gt=0)
+    image_height_px: int = Field(default=720, gt=0, le=_LARGEST_IMAGE_PX)
     """Height of that image."""
     max_items: int = Field(default=100, ge=1, le=1000)
     """Number of detections of one image that are kept; all are counted."""

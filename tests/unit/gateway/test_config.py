@@ -8,6 +8,7 @@ from gateway.config import DEFAULT_SOURCES, GatewaySettings, load_settings
 NUMBER = "{kind: number, topic: /a, type: n/msg/O, label: x"
 """A source of this kind, without its field and its end."""
 TEXT = "{kind: text, topic: /a, type: n/msg/O, label: x, field: a"
+DETECTIONS = "{kind: detections, topic: /a, type: n/msg/O"
 
 
 def load(tmp_path: Path, text: str) -> GatewaySettings:
@@ -112,6 +113,11 @@ def test_the_environment_overrides_the_file(tmp_path: Path, monkeypatch: pytest.
             "no value is good",
         ),
         ("sources: [{kind: odometry, unit: m, topic: /a, type: n/msg/O}]", "has no key 'unit'"),
+        (
+            f"sources: [{DETECTIONS}, image_width_px: 65536}}]",
+            "image_width_px' is 65536, expected: at most 65535",
+        ),
+        (f"sources: [{DETECTIONS}, image_height_px: 65536}}]", "image_height_px' is 65536"),
         (f"sources: [{', '.join(f'{NUMBER}{n}, field: a}}' for n in range(65))}]", "lists 65 generic values"),
         (f"sources: [{NUMBER}, field: a}}, {NUMBER}, field: b}}]", "sources lists 'number.x' 2 times"),
         ("sources: [{kind: odometry, topic: /a/, type: n/msg/O}]", "expected: a topic name"),
