@@ -70,8 +70,8 @@ class AccessControl:
             return
         files, tls_files = access_files
         self._reloader = CredentialReloader(files, tls_files, self._use)
-        self._store = self._reloader.loaded.store
-        self._authenticator = Authenticator(self._store)
+        self._loaded = self._reloader.loaded
+        self._authenticator = Authenticator(self._loaded.store)
         certificates = tls_files is not None and tls_files.client_ca is not None
         self.auth = Auth(
             self._authenticator,
@@ -118,11 +118,9 @@ class AccessControl:
             self.auth.end_revoked()
         if self._tls and loaded.tls:
             self._tls.use(loaded.tls)
-        changes = list(loaded.store.changes_since(self._store)) or ["certificates were exchanged"]
-        self._store = loaded.store
-        if more := changes[_MOST_NAMED:]:
-            changes[_MOST_NAMED:] = [f"and {len(more)} more"]
-        answer = f"{', '.join(changes)}; {len(loaded.store.credentials)} credentials are listed"
+        changes = ", ".join(_changes(self._loaded, loaded))
+        answer = f"{changes}; {len(loaded.store.credentials)} credentials are listed"
+        self._loaded = loaded
         if loaded.problem:
             answer = f"no credential is accepted: {loaded.problem}"
             _log.error("access: %s", answer)
@@ -136,3 +134,15 @@ class AccessControl:
                 answer=answer,
             )
         )
+
+
+def _changes(before: LoadedAccess, loaded: LoadedAccess) -> list[str]:
+    """Returns what differs in two versions, for the audit log."""
+    changes = list(loaded.store.changes_since(before.store))
+    if more := changes[_MOST_NAMED:]:
+        changes[_MOST_NAMED:] = [f"and {len(more)} more"]
+    if loaded.tls != before.tls:
+        changes.append("certificates were exchanged")
+    if before.problem and not loaded.problem:
+        changes.append("credentials are accepted again")
+    return changes

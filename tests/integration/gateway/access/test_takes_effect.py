@@ -271,6 +271,8 @@ async def test_a_new_server_certificate_is_shown_and_nobody_is_cut_off(tmp_path:
         assert await ping(before, login) == ""
         assert await stream.read() is not grpc.aio.EOF
         stream.cancel()
+    (record,) = records_of(robot.audit_file)
+    assert record["answer"] == "certificates were exchanged; 1 credentials are listed"
 
 
 async def test_a_new_ca_ends_what_the_old_one_has_signed_and_leaves_tokens(tmp_path: Path) -> None:
@@ -287,6 +289,9 @@ async def test_a_new_ca_ends_what_the_old_one_has_signed_and_leaves_tokens(tmp_p
 
         await until(with_new_ca, "")
         assert await ping(RobotGatewayStub(robot.channel(token, ca=old_ca)), token) == "UNAVAILABLE"
+    answers = ", ".join(each["answer"] for each in records_of(robot.audit_file))
+    assert "revoked ben" in answers
+    assert "certificates were exchanged" in answers
 
 
 async def test_a_damaged_list_changes_nothing_and_is_a_fault(tmp_path: Path) -> None:
@@ -328,6 +333,9 @@ async def test_a_list_that_stays_unreadable_admits_none_until_it_is_readable(
         hidden.rename(robot.directory.store_file)
         await until(lambda: ping(calls, login), "")
         await until(serving, True)
+    shut, opened = [each["answer"] for each in records_of(robot.audit_file)]
+    assert shut.startswith("no credential is accepted: ")
+    assert opened == "credentials are accepted again; 1 credentials are listed"
 
 
 async def test_a_disk_that_hangs_admits_none_until_it_answers(
