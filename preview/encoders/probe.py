@@ -96,6 +96,10 @@ class TrialProber:
                         pause_s = backoff.next_s()
                         reason += f" (tried again after {pause_s:g} s, for the next start of the preview)"
                     verdict = Verdict(present=True, proven=False, reason=reason)
+                except Exception as error:  # noqa: BLE001  # unknown; the preview waits, and has other encoders
+                    _log.exception("the trial of %s failed", encoder.name)
+                    reason = f"its trial failed: {type(error).__name__}: {error}"
+                    verdict = Verdict(present=True, proven=False, reason=reason)
             if verdict.proven and backoff.failures:
                 _log.info("encoder %s works now: the next start of the preview uses it", encoder.name)
             self.verdicts[encoder.name] = verdict

@@ -19,7 +19,7 @@ REFUSED = TrialError("it crashed when tried (SIGSEGV)")
 class Trials:
     """Counts trials; `outcome` is that of the next one of MPP, the others succeed."""
 
-    def __init__(self, outcome: Verdict | TrialError, trial_s: float = 0.0) -> None:
+    def __init__(self, outcome: Verdict | Exception, trial_s: float = 0.0) -> None:
         self.outcome = outcome
         self.at_s: list[float] = []
         self._trial_s = trial_s
@@ -29,7 +29,7 @@ class Trials:
             return PROVEN
         self.at_s.append(asyncio.get_running_loop().time())
         await asyncio.sleep(self._trial_s)
-        if isinstance(self.outcome, TrialError):
+        if isinstance(self.outcome, Exception):
             raise self.outcome
         return self.outcome
 
@@ -45,6 +45,21 @@ async def test_a_definite_result_is_kept(outcome: Verdict | TrialError) -> None:
     assert first.proven is (outcome is PROVEN)
     assert first.reason == ("" if first.proven else str(outcome))
     assert len(trials.at_s) == 1
+
+
+@in_virtual_time
+async def test_a_defect_in_a_trial_is_a_result_and_the_next_encoder_is_used(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """The defect: all that waited for the trial did so for ever, and the preview did not start."""
+    encoders = Selection([MPP, X264], 600, TrialProber(Trials(KeyError("first_byte_ms"))))
+    async with asyncio.timeout(1):
+        assert await encoders.probe()
+    chosen, choice = encoders.choose()
+    assert chosen is X264
+    assert choice.fallback_reason == "its trial failed: KeyError: 'first_byte_ms'"
+    assert "the trial of mpp-h265 failed" in caplog.text
+    assert "Traceback" in caplog.text
 
 
 @in_virtual_time
