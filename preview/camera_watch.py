@@ -2,7 +2,8 @@
 
 So an operator sees that a camera has been unplugged before asking for it, and one that is plugged in again is
 used at once. It looks only while a gateway watches, and not at cameras that are in use. Looking may block, at
-a file on a dead network share for example: it has a deadline in a thread of its own, and then a long pause.
+a file on a dead network share for example: it has a deadline in a thread of its own, and then a long pause. A
+look that still hangs then is waited for again, and no other begins beside it.
 """
 
 import asyncio
@@ -14,7 +15,7 @@ from typing import Final, NoReturn
 from common.errors import UserError
 from preview.config import PreviewSettings
 from preview.pipeline import sources
-from preview.pipeline.threads import in_thread
+from preview.pipeline.threads import SharedCall
 from preview.supervisor import Supervisor
 
 _log = logging.getLogger(__name__)
@@ -26,12 +27,13 @@ PAUSE_AFTER_HANG_S: Final = 60.0
 
 async def watch_cameras(supervisor: Supervisor, settings: PreviewSettings) -> NoReturn:
     """Reports to the supervisor which cameras are there, until it is cancelled."""
+    looks = SharedCall[dict[str, str]]()
     while True:
         pause_s = LOOK_EVERY_S
         if supervisor.is_watched:
             look = partial(problems, settings, supervisor.unused_cameras)
             try:
-                supervisor.cameras_found(await in_thread(look, LOOK_DEADLINE_S))
+                supervisor.cameras_found(await looks.result(look, LOOK_DEADLINE_S))
             except TimeoutError:
                 pause_s = PAUSE_AFTER_HANG_S
             except Exception:  # noqa: BLE001  # what a driver may do is not known; the others are watched on

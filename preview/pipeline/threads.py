@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import suppress
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 from common.deadline import within
 
@@ -32,6 +32,34 @@ async def in_thread(work: Callable[[], T], deadline_s: float) -> T:
         TimeoutError: no result within `deadline_s`. The thread is left behind and does not keep the process
             from exiting.
     """
+    done = _begin(work)
+    del work  # See `_begin`.
+    return await within(deadline_s, asyncio.wrap_future(done))
+
+
+class SharedCall(Generic[T]):
+    """A call that may block, or never return, and that is repeated: at most one thread is in it.
+
+    A caller that comes while it runs waits for the same result. With a thread for each attempt, a call that
+    hangs would leave one behind with each of them.
+    """
+
+    def __init__(self) -> None:
+        self._newest: Future[T] | None = None
+
+    async def result(self, work: Callable[[], T], deadline_s: float) -> T:
+        """Returns the result of the call that runs, or of a new one.
+
+        Raises:
+            TimeoutError: no result within `deadline_s`. The call goes on.
+        """
+        if self._newest is None or self._newest.done():
+            self._newest = _begin(work)
+        return await within(deadline_s, asyncio.wrap_future(self._newest))
+
+
+def _begin(work: Callable[[], T]) -> Future[T]:
+    """Begins a call in a daemon thread of its own, and returns its result to come."""
     done: Future[T] = Future()
     done.set_running_or_notify_cancel()  # From here on, giving up does not disturb the thread.
 
@@ -48,4 +76,4 @@ async def in_thread(work: Callable[[], T], deadline_s: float) -> T:
         done.set_result(result)
 
     threading.Thread(target=run, name="blocking-call", daemon=True).start()
-    return await within(deadline_s, asyncio.wrap_future(done))
+    return done

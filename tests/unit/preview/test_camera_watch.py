@@ -1,6 +1,7 @@
 """Looking which cameras are there goes on, whatever a look ends with."""
 
 import asyncio
+import threading
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 from preview import camera_watch
 from preview.camera_watch import LOOK_EVERY_S, PAUSE_AFTER_HANG_S, watch_cameras
 from preview.config import PreviewSettings
+from preview.pipeline.threads import SharedCall
 from tests.support.virtual_time import in_virtual_time
 
 
@@ -23,7 +25,7 @@ async def test_a_look_that_fails_is_repeated(monkeypatch: pytest.MonkeyPatch) ->
             raise error
         return {}
 
-    monkeypatch.setattr(camera_watch, "in_thread", look)
+    monkeypatch.setattr(SharedCall, "result", look)
     supervisor: Any = SimpleNamespace(
         is_watched=True, unused_cameras=(), cameras_found=lambda _: found_s.append(loop.time())
     )
@@ -36,3 +38,28 @@ async def test_a_look_that_fails_is_repeated(monkeypatch: pytest.MonkeyPatch) ->
     first_s = found_s[0] - began_s
     assert first_s == pytest.approx(2 * PAUSE_AFTER_HANG_S, abs=1)
     assert found_s[1] - found_s[0] == pytest.approx(LOOK_EVERY_S, abs=0.1)
+
+
+@in_virtual_time
+async def test_a_look_that_hangs_is_the_only_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The defect: each attempt left one more thread behind, a minute after the last."""
+    answers, found = threading.Event(), list[object]()
+
+    def look(*_: object) -> dict[str, str]:
+        answers.wait(30)
+        return {}
+
+    def threads() -> int:
+        return sum(thread.name == "blocking-call" for thread in threading.enumerate())
+
+    monkeypatch.setattr(camera_watch, "problems", look)
+    supervisor: Any = SimpleNamespace(is_watched=True, unused_cameras=(), cameras_found=found.append)
+    before = threads()
+    watching = asyncio.create_task(watch_cameras(supervisor, PreviewSettings()))
+    try:
+        await asyncio.sleep(10 * PAUSE_AFTER_HANG_S)
+        assert threads() == before + 1
+        assert not found
+    finally:
+        answers.set()
+        watching.cancel()

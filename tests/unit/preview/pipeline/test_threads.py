@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from preview.pipeline import threads
-from preview.pipeline.threads import in_thread
+from preview.pipeline.threads import SharedCall, in_thread
 from tests.support.waiting import wait_until
 
 
@@ -29,6 +29,27 @@ async def test_a_call_that_does_not_return_is_given_up() -> None:
     with pytest.raises(TimeoutError):
         await in_thread(returns.wait, 0.01)
     returns.set()
+
+
+async def test_a_call_that_hangs_is_shared_until_it_returns() -> None:
+    returns, begun = threading.Event(), list[int]()
+
+    def work(number: int) -> int:
+        begun.append(number)
+        returns.wait(5)
+        return number
+
+    call = SharedCall[int]()
+    for number in range(3):
+        with pytest.raises(TimeoutError):
+            await call.result(partial(work, number), 0.01)
+    assert len(begun) <= 1
+    waiting = [asyncio.create_task(call.result(partial(work, number), 5)) for number in (3, 4)]
+    await asyncio.sleep(0)
+    returns.set()
+    assert await asyncio.gather(*waiting) == [0, 0]
+    assert await call.result(partial(work, 5), 5) == 5
+    assert begun == [0, 5]
 
 
 async def test_what_a_call_references_is_free_before_its_result_is_seen(
