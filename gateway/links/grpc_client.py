@@ -1,5 +1,6 @@
 """What clients of services on gRPC share: the channel over a Unix socket, and its errors."""
 
+import asyncio
 from pathlib import Path
 from typing import Final
 
@@ -54,3 +55,9 @@ def failed(error: grpc.aio.AioRpcError) -> LinkLostError | RefusedError:
 def call_metadata(caller: str) -> tuple[tuple[str, str], ...]:
     """Returns the metadata of an operator's call that is passed on: its request ID, and who calls."""
     return (request_id.HEADER, request_id.current()), (_CALLER, caller)
+
+
+def is_cancelled() -> bool:
+    """Whether this task is cancelled: gRPC raises the same when the link closes the channel under a call."""
+    task = asyncio.current_task()
+    return bool(task and task.cancelling())

@@ -12,7 +12,7 @@ import grpc
 from common.errors import DefectError, DomainError, InvalidRequestError, NotFoundError
 from common.reasons import Reason
 from common.refusal import refusal_in
-from gateway.links.grpc_client import GONE
+from gateway.links.grpc_client import GONE, is_cancelled
 from gateway.links.watch import ABSENT
 
 _log = logging.getLogger(__name__)
@@ -69,12 +69,6 @@ class Refusals:
         except grpc.aio.AioRpcError as error:
             raise self.refused(error) from None
         except asyncio.CancelledError:
-            if _is_cancelled():
+            if is_cancelled():
                 raise
             raise self.unreachable(ABSENT) from None
-
-
-def _is_cancelled() -> bool:
-    """Whether this task is cancelled: gRPC raises the same when the link closes the channel under a call."""
-    task = asyncio.current_task()
-    return bool(task and task.cancelling())

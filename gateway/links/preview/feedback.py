@@ -8,6 +8,7 @@ from typing import Final, NoReturn, Protocol, TypeAlias
 
 from common.errors import NotRunningError
 from common.tasks import cancel
+from gateway.links.grpc_client import is_cancelled
 from gateway.links.link import RefusedError, ServiceClient
 from gateway.links.preview.state import PreviewReport, PreviewSpec
 from gateway.links.watch import LinkLostError, SharingConnector, WatchConnector
@@ -17,6 +18,7 @@ _log = logging.getLogger(__name__)
 
 _AGE_SPACING_S: Final = 0.1
 """The newest age is passed on at most this often; the adaptive bit rate looks at it every 0.6 s."""
+_UNREACHABLE: Final = "the preview service can't be reached at the moment"
 _REFUSALS: Final = {
     PreviewState.DISABLED: "the preview is off; turn it on first",
     PreviewState.STARTING: "the preview is starting; its first picture is a key frame",
@@ -78,13 +80,17 @@ class Feedback(SharingConnector[PreviewServiceClient]):
                 _REFUSALS.get(preview.state, f"the preview has failed: {preview.last_error}")
             )
         if self._client is None:
-            raise NotRunningError("the preview service can't be reached at the moment")
+            raise NotRunningError(_UNREACHABLE)
         try:
             return await self._client.request_key_frame(newest_pts)
         except LinkLostError as error:
             raise NotRunningError(f"the preview service does not answer: {error.reason}") from None
         except RefusedError as error:
             raise NotRunningError(f"the preview service refused: {error}") from None
+        except asyncio.CancelledError:
+            if is_cancelled():
+                raise
+            raise NotRunningError(_UNREACHABLE) from None
 
     def pass_on(self, age_ms: int) -> None:
         """Queues an age to be passed on; a newer one replaces it. Never waits."""

@@ -3,21 +3,27 @@
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import grpc
 import pytest
 
+from common.errors import NotRunningError
 from common.reasons import Reason
 from common.refusal import refusal_in
+from gateway.links.preview.feedback import Feedback
+from gateway.links.preview.wire import PreviewConnector
 from gateway.rpc.connections.admission import METHOD_RATES
+from gateway.status.preview import PreviewState
 from omniseer.gateway.v1.preview_pb2 import PICTURE_DELIVERY_DIRECT
 from omniseer.gateway.v1.robot_gateway_pb2 import ReportPictureRequest, RequestKeyFrameRequest
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from tests.support.eventually import eventually
 from tests.support.preview_double import PreviewDouble, serve_double
 from tests.support.running_gateway import Operator, running_gateway
+from tests.support.status import OFF
 
 FAST_ENOUGH_S = 5.0
 
@@ -92,6 +98,36 @@ async def test_a_preview_service_that_hangs_does_not_keep_the_caller(tmp_path: P
         assert (code, reason) == (grpc.StatusCode.FAILED_PRECONDITION, Reason.PREVIEW_NOT_RUNNING)
         assert "does not answer" in text
         double.thawed.set()
+
+
+async def test_a_link_that_drops_under_a_request_refuses_it(tmp_path: Path) -> None:
+    """The defect: the closed channel cancelled the caller's own task, and the caller got CANCELLED."""
+    asked = asyncio.Event()
+
+    class Silent(PreviewDouble):
+        async def RequestKeyFrame(self, _request: Any, _context: Any) -> Any:  # noqa: N802  # grpc's name
+            asked.set()
+            await asyncio.Event().wait()
+
+    socket = tmp_path / "preview.sock"
+    server = await serve_double(socket, Silent())
+    feedback = Feedback(PreviewConnector(socket))
+    running = replace(OFF, state=PreviewState.RUNNING)
+    try:
+        async with feedback.connect():
+            dropped = asyncio.create_task(feedback.request_key_frame(running, None))
+            await asked.wait()
+        with pytest.raises(NotRunningError, match="can't be reached at the moment"):
+            await dropped
+        asked.clear()
+        async with feedback.connect():
+            cancelled = asyncio.create_task(feedback.request_key_frame(running, None))
+            await asked.wait()
+            cancelled.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await cancelled
+    finally:
+        await server.stop(None)
 
 
 async def test_the_worst_age_is_shown_and_passed_on(tmp_path: Path) -> None:
