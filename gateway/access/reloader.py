@@ -156,6 +156,7 @@ class CredentialReloader:
         self._unconfirmed_since_s: float | None = None
         """When the first attempt began that has not shown yet that the list in effect is the newest."""
         self._polling = asyncio.Lock()
+        """Held by a poll: an earlier one that ended later would put a revoked credential back into effect."""
         self._polled_s = -math.inf
         self._next_poll: asyncio.Task[None] | None = None
 
@@ -197,21 +198,23 @@ class CredentialReloader:
     async def _keep_polling(self) -> NoReturn:
         while True:
             await asyncio.sleep(POLL_INTERVAL_S)
-            await self._poll()
+            async with self._polling:
+                await self._poll()
 
     async def _poll_when_due(self) -> None:
         await asyncio.sleep(max(0.0, self._polled_s + _UNKNOWN_INTERVAL_S - time.monotonic()))
-        self._next_poll = None
-        await self._poll()
+        async with self._polling:
+            # Not before: while the earlier poll hangs, all later callers share this one.
+            self._next_poll = None
+            await self._poll()
 
     async def _poll(self) -> None:
-        # One at a time: an earlier poll that ended later would put a revoked credential back into effect.
-        async with self._polling:
-            self._polled_s = time.monotonic()
-            if self._unconfirmed_since_s is None:
-                self._unconfirmed_since_s = self._polled_s
-            if await self._reload_if_changed():
-                self._unconfirmed_since_s = None
+        """Polls once; `_polling` is held."""
+        self._polled_s = time.monotonic()
+        if self._unconfirmed_since_s is None:
+            self._unconfirmed_since_s = self._polled_s
+        if await self._reload_if_changed():
+            self._unconfirmed_since_s = None
 
     async def _reload_if_changed(self) -> bool:
         """Returns whether the list of credentials could be read."""

@@ -2,6 +2,7 @@
 
 import asyncio
 import re
+import threading
 import time
 from contextlib import suppress
 from itertools import count
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import UserError
+from gateway.access import reloader
 from gateway.access.credential_admin import CredentialAdmin, CredentialRequest
 from gateway.access.directory import CredentialDirectory
 from gateway.access.reloader import CredentialReloader, LoadedAccess, TlsFiles, load_access
@@ -41,6 +43,35 @@ async def test_a_new_credential_is_loaded_at_once_and_reported_once(directory: C
     await reloader.reload_for_unknown()
     assert [set(each.store.credentials) for each in changes] == [{credential.credential_id}]
     assert reloader.loaded is changes[0]
+
+
+async def test_on_a_disk_that_hangs_unknown_credentials_share_one_poll(
+    directory: CredentialDirectory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The defect: each of them left a task behind that waited for the disk, without a limit."""
+    answers, hangs, signature = threading.Event(), threading.Event(), reloader._signature
+
+    def slow_signature(path: Path) -> tuple[int, ...]:
+        hangs.set()
+        answers.wait(30)
+        return signature(path)
+
+    changes: list[LoadedAccess] = []
+    reloading = CredentialReloader(directory, None, changes.append)
+    monkeypatch.setattr(reloader, "UNKNOWN_WITHIN_S", 0.02)
+    monkeypatch.setattr(reloader, "_signature", slow_signature)
+    try:
+        await reloading.reload_for_unknown()
+        assert await asyncio.to_thread(hangs.wait, 5)
+        for _ in range(10):
+            await reloading.reload_for_unknown()
+        polls = [each for each in asyncio.all_tasks() if each.get_name() == "reload for unknown credential"]
+        assert len(polls) == 2, "one hangs, and one begins after it"
+        credential, _ = CredentialAdmin(directory, "lab").add(CredentialRequest("anna", Role.VIEWER))
+    finally:
+        answers.set()
+    await asyncio.wait_for(asyncio.gather(*polls), 5)
+    assert [set(each.store.credentials) for each in changes] == [{credential.credential_id}]
 
 
 async def test_a_damaged_file_changes_nothing_and_is_reported_after_three_polls(
