@@ -11,6 +11,7 @@ from typing import Final, NoReturn
 from common import bind, heartbeat, rpc
 from common.health import Health
 from common.tasks import cancel
+from preview.camera_planner import CameraPlanner
 from preview.camera_watch import watch_cameras
 from preview.config import PreviewSettings
 from preview.encoders import trial
@@ -40,7 +41,7 @@ async def serve(settings: PreviewSettings, stop: asyncio.Event) -> None:
     selection = Selection(encoders.allowed, encoders.forgive_after_s, prober)
     marker = CrashMarkerFile(settings.runtime_dir)
     marker.blame_previous(selection)
-    supervisor = Supervisor(settings, selection, marker, Runner)
+    supervisor = Supervisor(settings, selection, marker, Runner, CameraPlanner(settings).plan)
     server = rpc.new_server()
     PreviewServicer(supervisor, prober, encoders.preference).register(server)
     Health(SERVICE).register(server)

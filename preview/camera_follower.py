@@ -2,15 +2,14 @@
 
 import asyncio
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from common.errors import UserError
 from common.timer import Timer
 from preview.cameras import Camera, Cameras
 from preview.config import PreviewSettings
-from preview.last_error import LastError
-from preview.pipeline import sources
-from preview.ports import Pipeline
+from preview.pipeline.events import Blame, Fault
+from preview.ports import Pipeline, PlanCamera
 
 _log = logging.getLogger(__name__)
 
@@ -22,14 +21,21 @@ class CameraFollower:
 
     Args:
         settings: name the cameras and their fallbacks.
-        last_error: where a camera that can't be used is reported.
+        plan_camera: plans a camera before it is started.
+        on_failure: called with a camera that can't be used, and why; hands it to `failed`, and returns
+            whether the pipeline goes on, with the live camera or another.
     """
 
-    def __init__(self, settings: PreviewSettings, last_error: LastError) -> None:
-        self._settings = settings
-        self._last_error = last_error
+    def __init__(
+        self, settings: PreviewSettings, plan_camera: PlanCamera, on_failure: Callable[[str, Fault], bool]
+    ) -> None:
+        self._plan_camera = plan_camera
+        self._on_failure = on_failure
         self._cameras = Cameras({name: each.fallback for name, each in settings.named_sources.items()})
         self._pipeline: Pipeline | None = None
+        self._planning: asyncio.Task[None] | None = None
+        self._planned: str | None = None
+        """The camera that is being planned, to be started."""
         self._retry_timer = Timer(self.follow)
 
     @property
@@ -56,7 +62,7 @@ class CameraFollower:
     def live_and_starting(self) -> tuple[str | None, str | None]:
         """The camera that is live in the running pipeline, and the one that is being started in it."""
         pipeline = self._pipeline
-        return (pipeline.live_camera, pipeline.starting_camera) if pipeline else (None, None)
+        return (pipeline.live_camera, self._planned or pipeline.starting_camera) if pipeline else (None, None)
 
     def listed(self, live: str | None, starting: str | None) -> tuple[Camera, ...]:
         """Returns all cameras; see `Cameras.listed`."""
@@ -70,6 +76,7 @@ class CameraFollower:
         """The pipeline runs no longer."""
         self._pipeline = None
         self._retry_timer.cancel()
+        self._stop_planning()
 
     def want(self, name: str) -> None:
         """Takes a request of an operator; see `Cameras.want`."""
@@ -100,32 +107,47 @@ class CameraFollower:
         pipeline = self._pipeline
         if pipeline is None:
             return
-        live, starting = pipeline.live_camera, pipeline.starting_camera
+        live, starting = self.live_and_starting
         if starting in self._cameras.chain and not new_request:
             return  # What follows is decided when it delivers, or fails.
-        if self._start_better(pipeline, live, starting) or live is None:
+        camera = self._cameras.next_attempt(live, _now())
+        if camera is not None:
+            if camera != starting:
+                self._start(pipeline, camera)
+            return
+        if live is None:
             return
         if starting is not None:
+            self._stop_planning()
             pipeline.show(None)
         wait_s = self._cameras.wait_s(live, _now())
         if wait_s is not None:
             self._retry_timer.start(wait_s)
 
-    def _start_better(self, pipeline: Pipeline, live: str | None, starting: str | None) -> bool:
-        """Starts the best camera that can be used; False if none is better than the live one."""
-        while (camera := self._cameras.next_attempt(live, _now())) is not None:
-            if camera == starting:
-                return True
-            try:
-                source = sources.plan_camera(self._settings, camera)
-            except UserError as error:
-                self._last_error.report(str(error))
-                self._cameras.failed(camera, str(error), _now())
-                continue
-            _log.info("camera %s -> %s", live or "(failed)", camera)
+    def _start(self, pipeline: Pipeline, camera: str) -> None:
+        """Plans a camera, and then starts it; counts as being started from now on."""
+        self._stop_planning()
+        self._planned = camera
+        self._planning = asyncio.create_task(self._show(pipeline, camera), name=f"plan of camera {camera}")
+
+    def _stop_planning(self) -> None:
+        self._planned = None
+        if self._planning:
+            self._planning.cancel()
+            self._planning = None
+
+    async def _show(self, pipeline: Pipeline, camera: str) -> None:
+        source, failure = None, ""
+        try:
+            source = await self._plan_camera(camera)
+        except UserError as error:
+            failure = str(error)
+        self._planning = self._planned = None
+        if source:
+            _log.info("camera %s -> %s", pipeline.live_camera or "(failed)", camera)
             pipeline.show(source)
-            return True
-        return False
+        elif not self._on_failure(camera, Fault(Blame.SOURCE, failure)):
+            pipeline.show(None)
 
 
 def _now() -> float:

@@ -238,7 +238,7 @@ class TimeoutSettings(Section):
     """Deadlines in seconds."""
 
     start_s: float = Field(default=5.0, gt=0, le=60)
-    """From building the pipeline to the first frame of the source."""
+    """From building the pipeline to the first frame of the source; before it, for a look at the source."""
     stop_s: float = Field(default=3.0, gt=0, le=60)
     """For tearing down a pipeline; after it the process ends."""
     source_silence_s: float = Field(default=1.5, gt=0, le=60)

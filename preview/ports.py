@@ -1,4 +1,4 @@
-"""What the supervisor and its parts need of pipelines and of the video tap."""
+"""What the supervisor and its parts need of pipelines, of cameras and of the video tap."""
 
 import asyncio
 from collections.abc import Callable
@@ -44,6 +44,7 @@ class Pipeline(Protocol):
         """Starts another camera beside the live one, instead of any that is being started; None: none.
 
         With its first frame it becomes the live one; viewers stay connected. Reported as an event.
+        With no live camera and none to be started, the pipeline fails with the fault of the last live one.
         """
 
     async def listen(self, passphrase: str | None) -> None:
@@ -71,6 +72,17 @@ class Pipeline(Protocol):
 
     async def write_graph(self, path: Path) -> None:
         """Writes its graph, for finding the cause of a fault."""
+
+
+class PlanCamera(Protocol):
+    """Plans cameras; `preview.camera_planner.CameraPlanner.plan` is the real one."""
+
+    async def __call__(self, camera: str) -> SourcePlan:
+        """Returns the first elements for a camera of the configuration.
+
+        Raises:
+            UserError: it can't be used.
+        """
 
 
 class Recording(Protocol):

@@ -10,6 +10,7 @@ What can fail, how it is noticed, and what follows:
 |---|---|---|
 | no encoder works | selection: UserError | FAULTED, retry with backoff |
 | source unusable, element missing | building: UserError | FAULTED, retry with backoff |
+| a look at a source hangs | deadline of the call | its fallback; or FAULTED, retry with backoff |
 | port in use, address not local | ERROR of the listener | FAULTED, retry with backoff |
 | source fails or ends | ERROR of the source, EOS | its fallback; a file loops instead |
 | source stalls | watchdog: no frames come in | its fallback |
@@ -75,7 +76,7 @@ from preview.lifecycle import (
 )
 from preview.pipeline.events import Blame, Fault, PipelineEvents
 from preview.pipeline.plan import Plan, make_plan
-from preview.ports import Pipeline, Recording
+from preview.ports import Pipeline, PlanCamera, Recording
 from preview.teardowns import Teardowns
 from preview.values import (
     CAPTURE_OFFSET_NS,
@@ -103,6 +104,7 @@ class Supervisor:
         encoders: chooses the encoder of each pipeline.
         marker: informs the next process if an encoder ends this one.
         new_pipeline: builds pipelines; raises UserError where one can't be built.
+        plan_camera: plans cameras.
     """
 
     def __init__(
@@ -111,11 +113,13 @@ class Supervisor:
         encoders: Selection,
         marker: CrashMarkerFile,
         new_pipeline: Callable[[Plan, PipelineEvents], Pipeline],
+        plan_camera: PlanCamera,
     ) -> None:
         self._settings = settings
         self._encoders = encoders
         self._marker = marker
         self._new_pipeline = new_pipeline
+        self._plan_camera = plan_camera
         self.changes = Broadcast()
         """Notified of each change of the actual state."""
         self._instance_id = uuid.uuid4().hex
@@ -123,7 +127,7 @@ class Supervisor:
         self._wake = asyncio.Event()
         self._desired = DesiredState()
         self._last_error = LastError()
-        self._cameras = CameraFollower(settings, self._last_error)
+        self._cameras = CameraFollower(settings, plan_camera, self.camera_failed)
         self._pipeline: Pipeline | None = None
         self._teardowns = Teardowns(marker, encoders)
         self._running_since = 0.0
@@ -351,7 +355,7 @@ class Supervisor:
 
     async def _start(self) -> None:
         await self._find_encoder()
-        if self._lifecycle.state is not State.STARTING:
+        if not self._is_starting():
             return
         try:
             encoder, choice = self._encoders.choose()
@@ -360,7 +364,10 @@ class Supervisor:
             return
         camera = self._cameras.first
         try:
-            plan = make_plan(self._settings, self._desired, encoder, choice, camera)
+            source = await self._plan_camera(camera)
+            if not self._is_starting():
+                return
+            plan = make_plan(self._settings, self._desired, encoder, choice, source)
             self._report_software_fallback(choice)
             pipeline = self._pipeline = self._new_pipeline(plan, self)
         except UserError as error:
@@ -373,6 +380,10 @@ class Supervisor:
         if self._recording:
             pipeline.record(self._recording.take)
         await pipeline.start()
+
+    def _is_starting(self) -> bool:
+        """Whether a pipeline is still to be started: a request may have come while something was awaited."""
+        return self._lifecycle.state is State.STARTING
 
     def _report_software_fallback(self, choice: EncoderChoice) -> None:
         """Software encoding on a robot with hardware encoders is an error, even though frames flow."""

@@ -87,11 +87,13 @@ class LiveCamera:
 
         Args:
             source: the newest one counts: a camera that is being started is stopped first. None: it is
-                stopped, and the live one stays.
+                stopped, and the live one stays; where there is none, the pipeline fails.
         """
         self._showing = source
         self._task = asyncio.create_task(self._show(source, self._task), name="camera")
         self._task.add_done_callback(lambda task: self._shown(task, source))
+        if source is None and self._lost:
+            self._fail(self._lost)
 
     def survives(self, fault: Fault) -> bool:
         """Whether the pipeline goes on without its live camera, which has this fault."""

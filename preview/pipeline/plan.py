@@ -4,7 +4,6 @@ from dataclasses import dataclass, field
 
 from preview.config import PreviewSettings, SrtSettings
 from preview.encoders.catalogue import Encoder
-from preview.pipeline import sources
 from preview.pipeline.sources import SourcePlan
 from preview.values import DesiredState, EncoderChoice, Profile, Target
 
@@ -46,12 +45,11 @@ class Plan:
 
 
 def make_plan(
-    settings: PreviewSettings, desired: DesiredState, encoder: Encoder, choice: EncoderChoice, camera: str
+    settings: PreviewSettings,
+    desired: DesiredState,
+    encoder: Encoder,
+    choice: EncoderChoice,
+    source: SourcePlan,
 ) -> Plan:
-    """Returns the plan for a desired state, an encoder and a camera.
-
-    Raises:
-        UserError: the camera can't be used.
-    """
-    source = sources.plan_camera(settings, camera)
+    """Returns the plan for a desired state, an encoder and a camera."""
     return Plan(settings, source, encoder, choice, desired.profile, desired.session)

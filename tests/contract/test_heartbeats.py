@@ -14,6 +14,7 @@ from gateway.links.bridge.link import BridgeLink
 from gateway.links.watch import ServiceWatch
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
 from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
+from preview.camera_planner import CameraPlanner
 from preview.config import PreviewSettings, TestSource
 from preview.encoders.catalogue import Encoder
 from preview.encoders.crash_marker import CrashMarkerFile
@@ -52,7 +53,8 @@ def test_an_idle_preview(tmp_path: Path) -> None:
         prober = TrialProber(no_trial)
         selection = Selection([], 600, prober)
         settings = PreviewSettings(source=TestSource(), runtime_dir=tmp_path)
-        supervisor = Supervisor(settings, selection, CrashMarkerFile(tmp_path), PipelineDoubles())
+        plan = CameraPlanner(settings).plan
+        supervisor = Supervisor(settings, selection, CrashMarkerFile(tmp_path), PipelineDoubles(), plan)
         servicer = PreviewServicer(supervisor, prober, ())
         reports = servicer.WatchActualState(preview_pb.WatchActualStateRequest(), NO_CONTEXT)
         assert await longest_gap_s(reports) * LATE_REPORTS < SILENCE_S

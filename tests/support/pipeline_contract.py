@@ -18,6 +18,7 @@ from preview.config import (
     TimeoutSettings,
 )
 from preview.encoders.catalogue import CATALOGUE
+from preview.pipeline import sources
 from preview.pipeline.events import AccessUnit, Blame, Fault, PipelineEvents
 from preview.pipeline.plan import Plan, make_plan
 from preview.pipeline.sources import SourcePlan
@@ -91,7 +92,8 @@ def plan_of(description: str, passphrase: str = "", start_s: float = 5.0) -> Pla
         timeouts=TimeoutSettings(start_s=start_s),
     )
     desired = DesiredState(1, True, Profile.BALANCED, passphrase)
-    return make_plan(settings, desired, CATALOGUE["x264"], EncoderChoice("x264", False, "x264"), "camera")
+    source = sources.plan_camera(settings, "camera")
+    return make_plan(settings, desired, CATALOGUE["x264"], EncoderChoice("x264", False, "x264"), source)
 
 
 def another(name: str, description: str = f"{LIVE} pattern=ball") -> SourcePlan:
@@ -196,6 +198,20 @@ class PipelineContract:
         pipeline.show(another("rear"))
         assert await (await pipeline.stop())
         assert not events.cameras
+
+    async def test_without_a_live_camera_and_another_one_the_pipeline_fails(self) -> None:
+        events = Events()
+        events.goes_on = True
+        pipeline = self.build(plan_of(f"{LIVE} num-buffers=15"), events)
+        await pipeline.start()
+        await events.wait_for("camera_failed")
+        assert cameras_of(pipeline) == (None, None)
+        assert not events.counts["failed"]
+        pipeline.show(None)
+        await events.wait_for("failed")
+        assert await (await pipeline.stop())
+        lost, failed = events.faults
+        assert failed is lost
 
     async def test_a_recording_gets_its_access_units_from_then_on(self) -> None:
         events, units = Events(), list[AccessUnit]()

@@ -97,6 +97,8 @@ class PipelineDouble:
         if source:
             self.starting_camera = source.camera
             self._showing = asyncio.get_running_loop().call_later(SHOW_S, self._shown, source)
+        elif self._lost:
+            self._fail(self._lost)
 
     def lose_camera(self, fault: Fault) -> None:
         """The live camera fails."""

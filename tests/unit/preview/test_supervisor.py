@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import pytest
 
-from common.errors import InvalidRequestError, NotRunningError
+from common.errors import InvalidRequestError, NotRunningError, UserError
 from preview import supervisor
 from preview.cameras import CameraState
 from preview.config import FileSource, PreviewSettings, TestSource, TimeoutSettings
@@ -18,7 +18,9 @@ from preview.encoders.crash_marker import CrashMarkerFile
 from preview.encoders.probe import TrialProber, Verdict
 from preview.encoders.selection import Selection
 from preview.lifecycle import Counters, Reason, State
+from preview.pipeline import sources
 from preview.pipeline.events import AccessUnit, Blame, Fault, HungError
+from preview.pipeline.sources import SourcePlan
 from preview.supervisor import ENCODER_STOP_S, GRAPH, STEADY_AFTER_S, Supervisor
 from preview.values import ActualState, DesiredState, Profile
 from tests.support.pipeline_double import FIRST_FRAME_S, SHOW_S, STOP_DEADLINE_S, PipelineDoubles, Script
@@ -36,6 +38,9 @@ PORT = Fault(Blame.LISTENER, "UDP port 7100 on 0.0.0.0 can't be used")
 ON = DesiredState(1, True, Profile.BALANCED)
 OFF = DesiredState(2, False)
 AGAIN = DesiredState(3, True, Profile.BALANCED)
+
+LOOK_S = 5.0
+"""The deadline of a look at a camera."""
 
 Test = TypeVar("Test", bound=Callable[..., object])
 tested: set[str] = set()
@@ -107,8 +112,12 @@ class Preview:
         self.pipelines = PipelineDoubles(*scripts)
         self.marker = Marker(directory)
         self.selection = Selection([CATALOGUE[name] for name in order], 600, trials or prober(), loop.time)
-        made = PreviewSettings(**values)  # type: ignore[arg-type]
-        self.supervisor = Supervisor(made, self.selection, self.marker, self.pipelines)
+        self.hung = set[str]()
+        """Cameras of which a look does not return; in virtual time, there are no threads."""
+        self._settings = PreviewSettings(**values)  # type: ignore[arg-type]
+        self.supervisor = Supervisor(
+            self._settings, self.selection, self.marker, self.pipelines, self._plan_camera
+        )
         self.stop = asyncio.Event()
 
     @asynccontextmanager
@@ -124,6 +133,12 @@ class Preview:
                 return
         self.stop.set()
         await running
+
+    async def _plan_camera(self, camera: str) -> SourcePlan:
+        if camera in self.hung:
+            await asyncio.sleep(LOOK_S)
+            raise UserError(f"camera {camera} does not answer")
+        return sources.plan_camera(self._settings, camera)
 
     async def until(self, holds: Callable[[ActualState], bool]) -> ActualState:
         """Waits for a condition of the actual state, at most some virtual minutes."""
@@ -204,6 +219,81 @@ async def test_a_source_that_appears_later(tmp_path: Path) -> None:
         assert str(film) in (await preview.reaches(State.FAULTED)).last_error
         film.write_bytes(b"x")
         assert (await preview.reaches(State.RUNNING)).counters.restarts == 1
+
+
+@row("a look at a source hangs")
+@in_virtual_time
+async def test_a_first_camera_that_does_not_answer_is_replaced(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, cameras=ROBOT)
+    preview.hung.add("front")
+    async with preview.serving():
+        preview.supervisor.apply(FRONT)
+        actual = await is_live(preview, "rear")
+        assert now() == pytest.approx(LOOK_S, abs=3 * FIRST_FRAME_S)
+        assert actual.last_error == "camera front does not answer"
+        # It is tried again, beside its fallback.
+        await preview.until(lambda it: cameras_of(it)["front"] is CameraState.STARTING)
+        await preview.until(lambda it: cameras_of(it)["front"] is CameraState.FAILED)
+        assert cameras_of(preview.supervisor.actual())["rear"] is CameraState.LIVE
+        preview.hung.clear()
+        await is_live(preview, "front")
+        assert len(preview.pipelines.built) == 1
+
+
+@row("a look at a source hangs")
+@in_virtual_time
+async def test_a_fallback_that_does_not_answer_is_given_up_for_the_camera_itself(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, Script(fault=SOURCE, fault_after_s=5), cameras=ROBOT)
+    preview.hung.add("rear")
+    async with preview.serving():
+        preview.supervisor.apply(FRONT)
+        await is_live(preview, "front")
+        await preview.until(lambda it: cameras_of(it)["rear"] is CameraState.STARTING)
+        lost_at = now()
+        actual = await is_live(preview, "front")
+        assert now() - lost_at == pytest.approx(LOOK_S + SHOW_S)
+        assert actual.counters == Counters(starts=1)
+        assert actual.cameras[1].error == "camera rear does not answer"
+
+
+@row("no fallback, or none that works")
+@in_virtual_time
+async def test_a_fallback_that_is_missing_ends_the_pipeline(tmp_path: Path) -> None:
+    cameras = {**ROBOT, "rear": FileSource(path=tmp_path / "film.mkv")}
+    preview = Preview(tmp_path, Script(fault=SOURCE, fault_after_s=5), cameras=cameras)
+    async with preview.serving():
+        preview.supervisor.apply(FRONT)
+        await is_live(preview, "front")
+        faulted = await preview.reaches(State.FAULTED)
+        assert now() == pytest.approx(5 + FIRST_FRAME_S, abs=0.01)
+        assert faulted.last_error == SOURCE.text
+        assert "film.mkv" in faulted.cameras[1].error
+        await is_live(preview, "front")
+
+
+@row("a look at a source hangs")
+@in_virtual_time
+async def test_while_a_camera_does_not_answer_requests_count(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, cameras=ROBOT)
+    preview.hung |= {"front", "arm"}
+    async with preview.serving():
+        preview.supervisor.apply(FRONT)
+        await asyncio.sleep(1)
+        preview.supervisor.apply(replace(OFF, revision=2))
+        await preview.reaches(State.DISABLED)
+        assert not preview.pipelines.built
+        preview.supervisor.apply(replace(REAR, revision=3))
+        await is_live(preview, "rear")
+        preview.supervisor.apply(replace(ARM, revision=4))
+        assert cameras_of(preview.supervisor.actual())["arm"] is CameraState.STARTING
+        await asyncio.sleep(1)
+        preview.hung.clear()
+        preview.supervisor.apply(replace(FRONT, revision=5))
+        await is_live(preview, "front")
+        await asyncio.sleep(2 * LOOK_S)
+        actual = preview.supervisor.actual()
+        assert cameras_of(actual)["front"] is CameraState.LIVE
+        assert cameras_of(actual)["arm"] is CameraState.READY, "the look was given up"
 
 
 @row("port in use, address not local")
@@ -347,7 +437,8 @@ async def test_a_camera_that_is_missing_is_not_even_started(tmp_path: Path) -> N
     async with preview.serving():
         preview.supervisor.apply(FRONT)
         await is_live(preview, "front")
-        actual = preview.supervisor.apply(ARM)
+        preview.supervisor.apply(ARM)
+        actual = await preview.until(lambda it: cameras_of(it)["arm"] is CameraState.FAILED)
         assert cameras_of(actual) == {
             "front": CameraState.LIVE,
             "rear": CameraState.READY,
