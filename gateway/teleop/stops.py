@@ -222,13 +222,21 @@ class Stops:
                 f"the present stop is {stop.stop_id}, by {stop.by}" if stop else "the robot is not stopped"
             )
             raise PreconditionError(f"stop {stop_id} can't be reset: {present}", Reason.STOP_NOT_RESET)
+
+        def answered() -> bool:
+            # A report of this stop without an obstacle is from before the reset has arrived.
+            actual = _report_since(self._link.view, now_ns)
+            return actual is not None and (
+                actual.stop is None or actual.stop.stop_id != stop_id or bool(actual.reset_obstacle)
+            )
+
         self._pace.forget()
         sent = self._commands.reset(stop_id)
-        if not sent or not await self._link.changes.wait_until(
-            lambda: _report_since(self._link.view, now_ns) is not None, CONFIRMED_WITHIN_S
-        ):
-            raise DriveUnreachableError(f"the robot's drive program does not answer: {HOW_TO_REACH}")
+        if sent:
+            await self._link.changes.wait_until(answered, CONFIRMED_WITHIN_S)
         view = self._link.view
+        if not sent or _report_since(view, now_ns) is None:
+            raise DriveUnreachableError(f"the robot's drive program does not answer: {HOW_TO_REACH}")
         newer = view.stop
         if newer and newer.stop_id == stop_id:
             obstacle = view.actual.reset_obstacle if view.actual else ""

@@ -11,13 +11,15 @@ import pytest
 from common.broadcast import Broadcast
 from common.errors import DriveUnreachableError, PreconditionError
 from gateway.status.teleop import DriveCounters, DrivePhase, DriveView, StopLatch
-from gateway.teleop.stops import COPIES_NS, MOST_COPIES, Copies, Stops
+from gateway.teleop.stops import CONFIRMED_WITHIN_S, COPIES_NS, MOST_COPIES, Copies, Stops
 from tests.support.drive_views import actual
 from tests.support.virtual_time import in_virtual_time
 
 NOW_NS = 10**15
 STOP = StopLatch(stop_id=7, by="anna", reason="", since_ns=NOW_NS)
 NEWER = StopLatch(stop_id=8, by="anna", reason="", since_ns=NOW_NS)
+ON_ITS_WAY_S = 0.001
+"""Of a reset, to the double."""
 
 
 def copies() -> Copies:
@@ -73,6 +75,8 @@ class Drive:
         """Whether it takes stops and does nothing."""
         self.kept = ""
         """Whose stop is not confirmed."""
+        self.obstacle = ""
+        """Keeps it from resetting stops."""
         self._instance_id = "a process"
         self._numbers = itertools.count(1)
         self._taken = 0
@@ -102,7 +106,11 @@ class Drive:
         self._report(DrivePhase.AVAILABLE, None)
 
     def reset(self, _stop_id: int) -> bool:
-        self._report(DrivePhase.AVAILABLE, None)
+        """Takes a reset a moment later; a report from before that comes first."""
+        loop = asyncio.get_running_loop()
+        loop.call_soon(self.report)
+        if not (self.hangs or self.obstacle):
+            loop.call_later(ON_ITS_WAY_S, self._report, DrivePhase.AVAILABLE, None)
         return True
 
     def report(self) -> None:
@@ -122,6 +130,7 @@ class Drive:
             stop=stop,
             monotonic_ns=time.monotonic_ns(),
             counters=DriveCounters(stops=self._taken),
+            reset_obstacle=self.obstacle,
         )
         self.view = replace(self.view, actual=report)
         self.changes.notify_all()
@@ -180,6 +189,32 @@ async def test_after_a_reset_a_stop_stops_anew(drive: Drive) -> None:
         stop = await stops.stop(by, "")
     await stops.reset(stop.stop_id)
     assert (await stops.stop("anna", "")).stop_id == 3
+
+
+async def test_a_report_from_before_a_reset_is_no_answer_to_it(drive: Drive) -> None:
+    """Reports come all the time, and so also while the reset is on its way."""
+    stops = stops_of(drive)
+    stop = await stops.stop("anna", "")
+    assert await stops.reset(stop.stop_id) == "the stop is reset; the driver has to release and to hold again"
+
+
+@in_virtual_time
+async def test_an_obstacle_is_an_answer_at_once(drive: Drive) -> None:
+    stops = stops_of(drive)
+    stop = await stops.stop("anna", "")
+    drive.obstacle = "the driver holds"
+    with pytest.raises(PreconditionError, match="is not reset: the driver holds"):
+        await stops.reset(stop.stop_id)
+    assert asyncio.get_running_loop().time() < CONFIRMED_WITHIN_S
+
+
+@in_virtual_time
+async def test_a_reset_that_nothing_follows_is_refused_in_the_end(drive: Drive) -> None:
+    stops = stops_of(drive)
+    stop = await stops.stop("anna", "")
+    drive.hangs = True
+    with pytest.raises(PreconditionError, match="is not reset: try again"):
+        await stops.reset(stop.stop_id)
 
 
 async def test_a_stop_that_finds_the_connection_full_is_sent_again(drive: Drive) -> None:
