@@ -51,6 +51,8 @@ class Fault:
         seen_s: when it was observed last.
         cleared_s: when it was cleared; None while it is active.
         times_raised: how often it was raised since the gateway started, this time included.
+        seen_severity: of the condition at the newest look; None where that was absent, so that the fault is
+            about to be cleared. A rule repeats this, and not the fault, while it does not know better.
     """
 
     condition: Condition
@@ -58,6 +60,7 @@ class Fault:
     seen_s: float
     cleared_s: float | None
     times_raised: int
+    seen_severity: Severity | None = None
 
     @property
     def active(self) -> bool:

@@ -20,7 +20,7 @@ _WORDS: Final[Mapping[tuple[Side, Severity], tuple[str, str]]] = {
 def number_conditions(
     spec: SourceSpec[Number], meaning: NumberMeaning, sample: Sample[Number], faults: tuple[Fault, ...]
 ) -> Iterator[Condition]:
-    """Yields the condition of the newest number, stale or not; an unknown one is judged as its fault says."""
+    """Yields the condition of the newest number, stale or not; an unknown one as the last known one."""
     found = violation_of(spec, meaning, sample, faults)
     if found is None:
         return
@@ -41,13 +41,13 @@ def violation_of(
     """Returns which limit the newest value violates, with the hysteresis of the faults; None if none.
 
     A stale value is the last that is known: silence neither cures nor keeps a fault. An unknown one (NaN) is
-    judged as its fault says.
+    judged as the last known one was, which is not what its fault says while that is about to be cleared.
     """
     before = {
-        side: fault.condition.severity
+        side: fault.seen_severity
         for fault in faults
         for side in Side
-        if fault.active and fault.condition.fault_id == _fault_id(spec, side)
+        if fault.seen_severity and fault.condition.fault_id == _fault_id(spec, side)
     }
     value = sample.value.value if sample.value else None
     if value is not None:

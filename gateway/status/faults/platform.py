@@ -27,12 +27,12 @@ class PlatformLimits:
     tilt_deg: Limit
 
 
-def platform_faults(
-    snapshot: Snapshot, limits: PlatformLimits, active: frozenset[str]
-) -> Iterator[Condition]:
-    """Yields the present conditions. An unknown or stale value neither raises nor clears a fault."""
+def platform_faults(snapshot: Snapshot, limits: PlatformLimits) -> Iterator[Condition]:
+    """Yields the present conditions. An unknown or stale value is judged as the last known one was."""
+    # Not all that are active: what was cured and is about to be cleared would stay for ever.
+    before = frozenset(each.condition.fault_id for each in snapshot.faults if each.seen_severity)
     for value, limit, condition in _checks(snapshot, limits):
-        was_broken = condition.fault_id in active
+        was_broken = condition.fault_id in before
         if was_broken if value is None else limit.broken(value, was_broken=was_broken):
             yield condition
     battery = snapshot[BATTERY]
@@ -44,7 +44,7 @@ def platform_faults(
             "Have its publisher send percentage as 0 to 1 (sensor_msgs/BatteryState), not as 0 to 100; "
             "then restart the gateway",
         )
-    yield from _throttling(snapshot, active)
+    yield from _throttling(snapshot, before)
     if snapshot[COMPUTE].freshness.stale or snapshot[NETWORK].freshness.stale:
         yield _warning(
             "platform.stale",
@@ -128,11 +128,11 @@ def _warning(fault_id: str, component: str, message: str, remedy: str) -> Condit
     return Condition(fault_id, Severity.WARNING, component, message, remedy)
 
 
-def _throttling(snapshot: Snapshot, active: frozenset[str]) -> Iterator[Condition]:
+def _throttling(snapshot: Snapshot, before: frozenset[str]) -> Iterator[Condition]:
     compute = snapshot[COMPUTE]
     throttled = compute.value.thermal_throttled if compute.value and compute.freshness.fresh else None
     fault_id = "platform.throttled"
-    if throttled or (throttled is None and fault_id in active):
+    if throttled or (throttled is None and fault_id in before):
         yield _warning(fault_id, _COMPUTER, "the processor is slowed down by heat", _COOL_DOWN)
 
 

@@ -63,5 +63,5 @@ def conditions(
     )
     yield from position_faults(snapshot)
     yield from value_faults(snapshot)
-    yield from platform_faults(snapshot, rules.platform, active)
+    yield from platform_faults(snapshot, rules.platform)
     yield from access_faults(snapshot.access, rules.expiry_days)

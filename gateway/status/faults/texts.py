@@ -17,12 +17,12 @@ _LONGEST_SLUG: Final = 40
 def text_conditions(
     spec: SourceSpec[Text], meaning: TextMeaning, sample: Sample[Text], faults: tuple[Fault, ...]
 ) -> Iterator[Condition]:
-    """Yields the condition of the newest text, stale or not; of one that is unknown, those of its faults."""
+    """Yields the condition of the newest text, stale or not; of an unknown one, that of the last known."""
     text = sample.value.text if sample.value else None
     beginning = f"{spec.name}.value."
     if text is None:
         for fault in faults:
-            if fault.active and fault.condition.fault_id.startswith(beginning):
+            if fault.seen_severity and fault.condition.fault_id.startswith(beginning):
                 yield fault.condition
     elif severity := meaning.severity(text):
         yield Condition(

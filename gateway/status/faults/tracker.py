@@ -53,8 +53,8 @@ class FaultTracker:
     def update(self, conditions: Iterable[Condition], now_s: float) -> Changes:
         """Tracks the conditions that are present at `now_s`; returns the difference."""
         present = {condition.fault_id: condition for condition in conditions}
-        present = {fault_id: self._held(condition, now_s) for fault_id, condition in present.items()}
-        candidates = {**self._lingering(now_s), **present}
+        held = {fault_id: self._held(condition, now_s) for fault_id, condition in present.items()}
+        candidates = {**self._lingering(now_s), **held}
         listed = self._listed(candidates)
         raised, worsened = [], []
         for fault_id in listed.keys() & (present.keys() | {CAPPED}):
@@ -62,14 +62,18 @@ class FaultTracker:
             if before is None:
                 raised.append(self._raise(condition, now_s))
                 continue
-            fault = self._active[fault_id] = replace(before, condition=condition, seen_s=now_s)
+            seen = present.get(fault_id, condition).severity
+            fault = replace(before, condition=condition, seen_s=now_s, seen_severity=seen)
+            self._active[fault_id] = fault
             if condition.severity.rank > before.condition.severity.rank:
                 worsened.append(fault)
         gone = [self._active.pop(fault_id) for fault_id in self._active.keys() - listed.keys()]
+        for fault_id in self._active.keys() - present.keys() - {CAPPED}:
+            self._active[fault_id] = replace(self._active[fault_id], seen_severity=None)
         self._severe_s = {fault_id: self._severe_s.get(fault_id, now_s) for fault_id in self._active}
         # A fault that lost its place in the list to a more severe one is still present.
         absent = [fault for fault in gone if fault.condition.fault_id not in candidates]
-        cleared = [replace(fault, cleared_s=now_s) for fault in absent]
+        cleared = [replace(fault, cleared_s=now_s, seen_severity=None) for fault in absent]
         self._cleared |= {fault.condition.fault_id: fault for fault in cleared}
         self._forget(now_s)
         self.faults = (*_by_weight(self._active.values()), *reversed(self._cleared.values()))
@@ -116,7 +120,7 @@ class FaultTracker:
         if len(self._times) > _MOST_COUNTED:
             del self._times[next(iter(self._times))]
         self._cleared.pop(fault_id, None)
-        fault = self._active[fault_id] = Fault(condition, now_s, now_s, None, times)
+        fault = self._active[fault_id] = Fault(condition, now_s, now_s, None, times, condition.severity)
         return fault
 
     def _forget(self, now_s: float) -> None:

@@ -13,7 +13,7 @@ from gateway.status.values import Number, Text
 
 
 def value_faults(snapshot: Snapshot) -> Iterator[Condition]:
-    """Yields the present conditions. An unknown or stale value neither raises a fault nor clears one."""
+    """Yields the present conditions. An unknown or stale value is judged as the last known one."""
     for source in snapshot.sources:
         spec, meaning = source.spec, source.spec.meaning
         match meaning:

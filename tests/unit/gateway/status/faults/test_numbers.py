@@ -59,6 +59,24 @@ def test_what_was_cured_before_the_silence_stays_cured() -> None:
     assert robot.active() == {"number.motor.stale": Severity.WARNING}
 
 
+def test_what_was_cured_before_the_number_was_unknown_stays_cured() -> None:
+    robot = Robot()
+    robot.reads(96.0)
+    robot.reads(60.0)
+    for _ in range(3):
+        robot.reads(None)
+    assert robot.active() == {"number.motor.no_value": Severity.WARNING}
+
+
+def test_what_was_less_severe_before_the_number_was_unknown_becomes_less_severe() -> None:
+    robot = Robot()
+    robot.reads(96.0)
+    robot.reads(85.0)
+    for _ in range(3):
+        robot.reads(None)
+    assert set(robot.active().items()) >= {("number.motor.high", Severity.WARNING)}
+
+
 def sentences(events: list[Event]) -> list[str]:
     return [event.sentence or event.message for event in events]
 

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from gateway.config.faults import FaultSettings, LowerLimit, UpperLimit
 from gateway.status.board import Board, Publishers, Unusable
-from gateway.status.fault import Condition, Severity
+from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.faults.rules import FaultRules, conditions
 from gateway.status.faults.sources import STATE_FAULTS
 from gateway.status.limit import Limit
@@ -79,7 +79,14 @@ def snapshot(of: Board, preview: PreviewView = OFF, **required: bool) -> Snapsho
 
 
 def found(of: Snapshot, active: frozenset[str] = frozenset(), up_s: float = 100.0) -> dict[str, Condition]:
-    return {each.fault_id: each for each in conditions(of, RULES, active, up_s)}
+    faults = tuple(fault_of(fault_id) for fault_id in active)
+    return {each.fault_id: each for each in conditions(replace(of, faults=faults), RULES, active, up_s)}
+
+
+def fault_of(fault_id: str) -> Fault:
+    """A fault whose condition was present at the last look."""
+    condition = Condition(fault_id, Severity.WARNING, "component", "message", "remedy")
+    return Fault(condition, NOW_S - 1, NOW_S - 1, None, 1, condition.severity)
 
 
 def test_nothing_is_wrong_with_a_robot_that_is_well() -> None:

@@ -63,6 +63,14 @@ def test_what_was_cured_before_the_silence_stays_cured() -> None:
     assert set(robot.waits()) == {"text.gripper.stale"}
 
 
+def test_what_was_cured_before_the_text_was_unknown_stays_cured() -> None:
+    robot = Robot()
+    robot.says("jammed!")
+    robot.now_s -= 2.5
+    assert set(robot.says("open")) == {"text.gripper.value.jammed"}, "it is not cleared yet"
+    assert set(robot.says(None)) == {"text.gripper.no_value"}
+
+
 def test_silence_and_no_text_keep_what_was_bad() -> None:
     robot = Robot()
     robot.says("jammed!")

@@ -39,6 +39,21 @@ def test_a_fault_is_over_when_its_condition_stayed_away_long_enough(book: FaultT
     assert (fault.active, fault.cleared_s) == (False, 12.0)
 
 
+@pytest.mark.parametrize("clear_after_s", [CLEAR_AFTER_S, 0.0])
+def test_a_condition_is_seen_at_the_newest_look_alone(clear_after_s: float) -> None:
+    book = FaultTracker(clear_after_s, KEEP_CLEARED_S)
+
+    def seen(severity: Severity | None, now_s: float) -> Severity | None:
+        book.update([condition("a", severity)] if severity else [], now_s)
+        return book.faults[0].seen_severity
+
+    assert seen(Severity.ERROR, 10.0) is Severity.ERROR
+    assert seen(Severity.WARNING, 11.0) is Severity.WARNING, "although the fault may be an error still"
+    assert seen(None, 12.0) is None, "although the fault may be active still"
+    assert seen(None, 15.0) is None
+    assert seen(Severity.WARNING, 16.0) is Severity.WARNING
+
+
 def test_what_comes_and_goes_quickly_is_one_fault(book: FaultTracker) -> None:
     for step in range(40):
         changes = book.update([condition("a")] if step % 2 else [], step * 0.9)
