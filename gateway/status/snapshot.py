@@ -29,6 +29,8 @@ from gateway.status.teleop import TeleopView
 MEASUREMENT_STALE_AFTER_MS: Final = 2000
 ROS_STALLED_AFTER_S: Final = 2.0
 """Forty passes of the ROS sampler: it hangs in the middleware, or the computer is overloaded."""
+_ROS_LATE_AFTER_S: Final = 0.25
+"""Five passes: a value that has become stale meanwhile is no longer about to be judged by the next one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,13 +176,18 @@ def take(
     samples = {spec: sample(board[spec], rule.stale_after_ms, now_s) for spec, rule in configured.items()}
     for spec in PLATFORM_SOURCES:
         samples[spec] = sample(board[spec], rules.platform_stale_after_ms, now_s)
-    ros_stalled = board.ros_passed_s is not None and now_s - board.ros_passed_s > ROS_STALLED_AFTER_S
+    unpassed_s = 0.0 if board.ros_passed_s is None else now_s - board.ros_passed_s
+    ros_stalled = unpassed_s > ROS_STALLED_AFTER_S
+    unread = {spec for spec, rule in configured.items() if _unread(board, spec, rule, samples[spec])}
+    not_read = unread if unpassed_s > _ROS_LATE_AFTER_S else set()
+    if ros_stalled:
+        not_read = set(configured)
     return Snapshot(
         at_s=now_s,
         identity=setup.identity,
         gateway=noted.gateway,
         health=NOT_READ
-        if ros_stalled
+        if ros_stalled or any(configured[spec].required for spec in not_read)
         else assess(
             (
                 (spec.health_name or spec.display_name, samples[spec].freshness)
@@ -204,7 +211,8 @@ def take(
                 required=rule.required,
                 unusable=board.unusable.get(spec),
                 undecodable=spec in board.undecodable,
-                stalled=ros_stalled,
+                unread=spec in unread,
+                not_read=spec in not_read,
             )
             for spec, rule in configured.items()
         ),
@@ -216,6 +224,14 @@ def take(
         recorder=programs.recorder,
         cloud=programs.cloud,
     )
+
+
+def _unread(board: Board, spec: SourceSpec[Any], rule: SourceRule, now: Sample[Any]) -> bool:
+    """Returns whether a value is stale now, but was not at the sampler's last pass: a newer one may wait."""
+    passed_s = board.ros_passed_s
+    if passed_s is None or not now.freshness.stale:
+        return False
+    return not sample(board[spec], rule.stale_after_ms, passed_s).freshness.stale
 
 
 def _command(rules: Rules, board: Board, now_s: float) -> Sample[Command]:

@@ -32,13 +32,19 @@ class SourceState(Enum):
 
 
 class SourceView(NamedTuple):
-    """One configured source at one instant; `detail` explains the state, empty if all is well."""
+    """One configured source at one instant.
+
+    Attributes:
+        detail: explains the state; empty if all is well.
+        unread: whether it is stale only since the ROS sampler last passed, which accuses no publisher.
+    """
 
     spec: SourceSpec[Any]
     state: SourceState
     freshness: Freshness
     required: bool
     detail: str
+    unread: bool
 
 
 _SENTENCES: Final[Mapping[SourceState, str]] = {
@@ -67,7 +73,8 @@ def source_view(
     required: bool,
     unusable: Unusable | None,
     undecodable: bool,
-    stalled: bool,
+    unread: bool,
+    not_read: bool,
 ) -> SourceView:
     """Returns the view of one source.
 
@@ -78,12 +85,13 @@ def source_view(
         required: whether the configuration requires it.
         unusable: why it is not subscribed; None if it is.
         undecodable: whether its newest message could not be decoded.
-        stalled: whether the ROS sampler makes no progress.
+        unread: whether it is stale only since the ROS sampler last passed.
+        not_read: whether that was too long ago to judge by silence.
     """
     state = _state(freshness, publishers, unusable=unusable, undecodable=undecodable)
-    if stalled and state in _BLAMES_SILENCE:
-        return SourceView(spec, state, freshness, required, _NOT_READ)
-    return SourceView(spec, state, freshness, required, detail(state, spec.display_name, publishers))
+    blames_silence = not_read and state in _BLAMES_SILENCE
+    sentence = _NOT_READ if blames_silence else detail(state, spec.display_name, publishers)
+    return SourceView(spec, state, freshness, required, sentence, unread)
 
 
 def detail(state: SourceState, name: str, publishers: Publishers | None) -> str:

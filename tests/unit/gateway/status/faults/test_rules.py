@@ -169,12 +169,52 @@ def test_a_sampler_without_progress_is_one_fault_and_accuses_no_publisher() -> N
     stalled = snapshot(of, odometry=True)
     assert set(found(stalled)) == {"ros.stalled"}
     assert found(stalled)["ros.stalled"].severity is Severity.ERROR
-    assert set(found(stalled, active=frozenset({"odometry.stale"}))) == {"ros.stalled", "odometry.stale"}
     assert stalled.health.summary == "the gateway does not read ROS"
     assert not stalled.health.ready
     assert stalled.sources[0].detail == "the gateway does not read ROS at the moment"
+    of[ODOMETRY] = Received(Velocity(0, 0, 0), NOW_S - 3.2)
+    active = frozenset({"odometry.stale"})
+    assert set(found(snapshot(of, odometry=True), active)) == {"ros.stalled", "odometry.stale"}
     of.ros_passed_s = NOW_S - 1.9
     assert set(found(snapshot(of, odometry=True))) == {"odometry.stale"}
+
+
+@pytest.mark.parametrize(
+    ("received_s", "passed_s", "faults", "detail", "health"),
+    [
+        pytest.param(
+            1.5,
+            0.9,
+            set(),
+            "the gateway does not read ROS at the moment",
+            "the gateway does not read ROS",
+            id="the sampler hangs",
+        ),
+        pytest.param(
+            1.01, 0.03, set(), "odometry stopped coming", "odometry stale", id="the next pass will show it"
+        ),
+        pytest.param(
+            1.9,
+            0.89,
+            {"odometry.stale"},
+            "odometry stopped coming",
+            "odometry stale",
+            id="silent before that",
+        ),
+        pytest.param(0.9, 0.85, set(), "", "robot healthy", id="not old yet"),
+    ],
+)
+def test_silence_accuses_a_publisher_at_the_last_pass_of_the_sampler(
+    received_s: float, passed_s: float, faults: set[str], detail: str, health: str
+) -> None:
+    """The defect: a sampler that hung for a second accused every publisher."""
+    of = board()
+    of.publishers[ODOMETRY] = Publishers(1)
+    of[ODOMETRY], of.ros_passed_s = Received(Velocity(0, 0, 0), NOW_S - received_s), NOW_S - passed_s
+    seen = snapshot(of, odometry=True)
+    assert set(found(seen)) == faults
+    assert (seen.sources[0].detail, seen.health.summary) == (detail, health)
+    assert seen[ODOMETRY].freshness.stale == (received_s > 1), "whatever the reason: operators see its age"
 
 
 def test_two_publishers_of_one_source_are_said_so() -> None:
