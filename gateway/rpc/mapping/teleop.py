@@ -14,6 +14,8 @@ from omniseer.gateway.v1 import teleop_pb2 as pb
 COMMAND_STALE_AFTER_MS: Final = 500
 """The usual timeout of twist_mux, after which a command has no effect."""
 _NS_PER_MS: Final = 1_000_000
+_LONGEST_AGE_MS: Final = 2**32 - 1
+"""The schema's uint32. Drivers choose the instants of echo and picture, and a robot may be up for longer."""
 
 
 def teleop_status(view: TeleopView, now_s: float) -> system_status_pb2.TeleopStatus:
@@ -75,10 +77,11 @@ def drive_state(facts: DriveFacts) -> pb.DriveResponse:
         newest_sequence=facts.newest_sequence,
         phase=DRIVE_PHASES[facts.phase],
         inhibits=[DRIVE_INHIBITS[each] for each in facts.inhibits],
-        command_age_ms=facts.command_age_ms,
-        loop_age_ms=facts.loop_age_ms,
-        picture_age_ms=facts.picture_age_ms,
+        command_age_ms=min(facts.command_age_ms, _LONGEST_AGE_MS),
+        loop_age_ms=min(facts.loop_age_ms, _LONGEST_AGE_MS),
     )
+    if facts.picture_age_ms is not None:
+        state.picture_age_ms = min(facts.picture_age_ms, _LONGEST_AGE_MS)
     if actual:
         velocity = actual.velocity
         state.vx_mps, state.vy_mps, state.wz_rad_s = velocity.vx_mps, velocity.vy_mps, velocity.wz_rad_s
