@@ -59,12 +59,12 @@ class Heartbeats:
     def _notify(self, message: bytes) -> None:
         if not self._address:
             return
-        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as supervisor:
-            supervisor.setblocking(False)
-            try:
+        try:
+            with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as supervisor:
+                supervisor.setblocking(False)
                 supervisor.sendto(message, self._address)
-            except OSError as error:
-                _log.warning("%s did not reach the supervisor: %s", message.decode(), error)
+        except OSError as error:
+            _log.warning("%s did not reach the supervisor: %s", message.decode(), error)
 
 
 @cache

@@ -56,13 +56,11 @@ class DriveConnector:
         Raises:
             LinkLostError: it does not answer.
         """
-        with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as packets:
-            packets.setblocking(False)
-            try:
-                # A Unix socket connects at once, or not at all.
-                packets.connect(str(self.path))
-            except OSError as error:
-                raise LinkLostError(ABSENT, f"{self.path}: {error.strerror or error}") from None
+        try:
+            packets = _connected_to(self.path)
+        except OSError as error:
+            raise LinkLostError(ABSENT, f"{self.path}: {error.strerror or error}") from None
+        with packets:
             client = DriveClient(packets, self.episode_ended)
             loop = asyncio.get_running_loop()
             loop.add_reader(packets, client.read)
@@ -72,6 +70,23 @@ class DriveConnector:
                 yield client
             finally:
                 loop.remove_reader(packets)
+
+
+def _connected_to(path: Path) -> socket.socket:
+    """Returns a connection that does not block.
+
+    Raises:
+        OSError: nothing listens there, or this process has no descriptor left.
+    """
+    packets = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    try:
+        packets.setblocking(False)
+        # A Unix socket connects at once, or not at all.
+        packets.connect(str(path))
+    except OSError:
+        packets.close()
+        raise
+    return packets
 
 
 class DriveClient:

@@ -6,7 +6,7 @@ import os
 import socket
 import stat
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import ExitStack, asynccontextmanager
 from pathlib import Path
 
 from common.deadline import within
@@ -57,23 +57,25 @@ async def handed_file(path: Path, key: bytes, threads: ReaderThreads) -> AsyncIt
         The file; None where the recorder can't be connected to, or hands none over: the export's call has the
         chunks, or the reason.
     """
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK) as connected:
+    taken = None
+    with ExitStack() as opened:
         try:
+            # Without a descriptor left this fails as well.
+            connected = opened.enter_context(
+                socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK)
+            )
             taken = await within(CONNECT_WITHIN_S, _taken(connected, path, key))
         except OSError as error:
             _log.info("an export's connection to the recorder: %s", error.strerror or "no answer")
-            taken = None
         if taken is None:
             # First: the recorder then knows that its call has to carry the chunks.
-            connected.close()
+            opened.close()
             yield None
             return
         descriptor, (offset, end, max_bytes_per_s) = taken
         file = OpenFile(descriptor, end, threads)
-        try:
-            yield HandedFile(file, offset, Pace(max_bytes_per_s), connected)
-        finally:
-            file.close()
+        opened.callback(file.close)
+        yield HandedFile(file, offset, Pace(max_bytes_per_s), connected)
 
 
 async def _taken(connected: socket.socket, path: Path, key: bytes) -> tuple[int, tuple[int, int, int]] | None:

@@ -1,5 +1,6 @@
 """What a supervisor hears by sd_notify: from `Heartbeats` alone, and from a whole program."""
 
+import errno
 import logging
 import os
 import signal
@@ -8,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -58,6 +60,22 @@ def test_it_says_when_it_serves_lives_and_ends(supervisor: socket.socket) -> Non
     heartbeats.stopping()
     assert heard(supervisor) == [b"READY=1", b"WATCHDOG=1", b"STOPPING=1"]
     assert not {"NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID"} & os.environ.keys()
+
+
+@pytest.mark.usefixtures("environment")
+def test_without_a_descriptor_a_heartbeat_is_missed_and_the_program_goes_on(
+    supervisor: socket.socket, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def refused(*_: Any) -> socket.socket:
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    heartbeats = Heartbeats()
+    with monkeypatch.context() as without, caplog.at_level(logging.WARNING):
+        without.setattr(socket, "socket", refused)
+        heartbeats.send()
+    assert "WATCHDOG=1 did not reach the supervisor" in caplog.text
+    heartbeats.ready()
+    assert heard(supervisor) == [b"READY=1"]
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,14 @@
 """The gateway's end of the socket: the newest report counts, every time of motion does, losses are seen."""
 
+import errno
 import socket
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from gateway.links.drive.wire import DriveClient
+from gateway.links.drive.wire import DriveClient, DriveConnector
 from gateway.links.watch import LinkLostError
 from omniseer.drive.v1 import drive_pb2 as pb
 
@@ -93,3 +95,18 @@ async def test_what_is_no_message_is_a_loss(ends: Ends, packet: bytes) -> None:
     ends.client.read()
     with pytest.raises(LinkLostError, match="version"):
         await anext(ends.client.reports())
+
+
+async def test_without_a_descriptor_for_a_connection_the_link_is_lost_and_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The defect: the error ended the gateway."""
+
+    def refused(*_: Any) -> socket.socket:
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    monkeypatch.setattr(socket, "socket", refused)
+    with pytest.raises(LinkLostError) as lost:
+        async with DriveConnector(tmp_path / "drive.sock", lambda *_: None).connect():
+            pass
+    assert "Too many open files" in lost.value.detail
