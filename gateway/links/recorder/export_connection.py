@@ -57,30 +57,29 @@ async def handed_file(path: Path, key: bytes, threads: ReaderThreads) -> AsyncIt
         The file; None where the recorder can't be connected to, or hands none over: the export's call has the
         chunks, or the reason.
     """
-    taken = None
+    handed = None
     with ExitStack() as opened:
         try:
-            # Without a descriptor left this fails as well.
-            connected = opened.enter_context(
-                socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK)
-            )
-            taken = await within(CONNECT_WITHIN_S, _taken(connected, path, key))
+            handed = await within(CONNECT_WITHIN_S, _handed(path, key, threads, opened))
         except OSError as error:
             _log.info("an export's connection to the recorder: %s", error.strerror or "no answer")
-        if taken is None:
+        if handed is None:
             # First: the recorder then knows that its call has to carry the chunks.
             opened.close()
-            yield None
-            return
-        descriptor, (offset, end, max_bytes_per_s) = taken
-        file = OpenFile(descriptor, end, threads)
-        opened.callback(file.close)
-        yield HandedFile(file, offset, Pace(max_bytes_per_s), connected)
+        yield handed
 
 
-async def _taken(connected: socket.socket, path: Path, key: bytes) -> tuple[int, tuple[int, int, int]] | None:
-    """Returns the descriptor, and the content of ORDER; None if the recorder hands over no file."""
+async def _handed(path: Path, key: bytes, threads: ReaderThreads, opened: ExitStack) -> HandedFile | None:
+    """Returns the file; None if the recorder hands over none.
+
+    Args:
+        path: as of `handed_file`.
+        key: the same.
+        threads: the same.
+        opened: closes what this opens. A cancellation may come with the result, which no caller gets then.
+    """
     loop = asyncio.get_running_loop()
+    connected = opened.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK))
     # A Unix socket connects at once, or not at all (EAGAIN: too many connections wait).
     connected.connect(str(path))
     await loop.sock_sendall(connected, key)
@@ -94,13 +93,12 @@ async def _taken(connected: socket.socket, path: Path, key: bytes) -> tuple[int,
         if data:
             _log.warning("the recorder has handed over no file for an export; disconnected")
         return None
-    try:
-        # One byte in an empty buffer never waits.
-        connected.send(TAKEN)
-    except OSError:
-        os.close(descriptors[0])
-        raise
-    return descriptors[0], ORDER.unpack(data)
+    offset, end, max_bytes_per_s = ORDER.unpack(data)
+    file = OpenFile(descriptors[0], end, threads)
+    opened.callback(file.close)
+    # One byte in an empty buffer never waits.
+    connected.send(TAKEN)
+    return HandedFile(file, offset, Pace(max_bytes_per_s), connected)
 
 
 async def _readable(connected: socket.socket) -> None:
