@@ -9,12 +9,12 @@ from gateway.status.event import (
     Event,
     FaultCleared,
     FaultRaised,
-    ModeChanged,
     PreviewChanged,
 )
 from gateway.status.fault import Fault, Severity
 from gateway.status.faults.rules import FaultRules, conditions
 from gateway.status.faults.tracker import Changes, FaultTracker
+from gateway.status.mode_events import ModeEvents
 from gateway.status.preview import Encoder, PreviewState, PreviewView, Profile, live_camera
 from gateway.status.recording_events import RecordingEvents
 from gateway.status.snapshot import Snapshot
@@ -41,7 +41,7 @@ class Observer:
         self._started_s: float | None = None
         self._preview: tuple[PreviewState, Profile | None, str] | None = None
         self._encoder: Encoder | None = None
-        self._mode = ""
+        self._modes = ModeEvents()
         self._recordings = RecordingEvents()
         self._cloud = CloudEvents()
 
@@ -85,11 +85,7 @@ class Observer:
 
     def _mode_events(self, snapshot: Snapshot) -> Iterator[Event]:
         value = snapshot[MODE].value
-        mode = value.name if value else ""
-        if mode != self._mode:
-            self._mode = mode
-            sentence = f"robot mode: {mode}"
-            yield Event(Severity.INFO, "mission", sentence, ModeChanged(mode), sentence)
+        yield from self._modes.take(value.name if value else "", snapshot.at_s)
 
 
 def _fault_events(changes: Changes) -> Iterator[Event]:

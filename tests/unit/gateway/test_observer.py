@@ -2,7 +2,7 @@ from dataclasses import replace
 from typing import Any
 
 from gateway.status.board import Board
-from gateway.status.event import EncoderFallback, Event, FaultRaised, PreviewChanged
+from gateway.status.event import EncoderFallback, Event, FaultRaised, ModeChanged, PreviewChanged
 from gateway.status.fault import Severity
 from gateway.status.preview import Camera, CameraState, Encoder, PreviewState, PreviewView, Profile
 from gateway.status.snapshot import Snapshot, SourceRule
@@ -142,6 +142,16 @@ def test_another_mode_is_news() -> None:
     board[MODE] = Received(Mode("exploring"), at_s=100.0)
     assert sentences(observer.observe(snapshot(board))) == ["robot mode: exploring"]
     assert sentences(observer.observe(snapshot(board, now_s=5000.0)))[1:] == []
+
+
+def test_a_mode_that_alternates_at_each_look_is_not_an_event_at_each() -> None:
+    observer, board = new_observer(startup_grace_s=60), Board()
+    events = 0
+    for look in range(1000):
+        board[MODE] = Received(Mode(("idle", "exploring")[look % 2]), at_s=100.0)
+        found = observer.observe(snapshot(board))
+        events += sum(isinstance(each.detail, ModeChanged) for each in found)
+    assert events < 30
 
 
 def test_an_unreachable_service_is_news_and_worse_when_somebody_wants_it() -> None:
