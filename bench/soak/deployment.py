@@ -13,7 +13,7 @@ from unittest.mock import patch
 from bench.product import serving
 from bench.soak.readings import Reading
 from common.ros_transport import VARIABLE
-from console.client import CloudState, GatewayClient
+from console.client import CloudState, GatewayClient, Unreachable
 from console.client.results import RecorderState
 from console.receiver.address import StreamAddress
 from simrobot.control import ask
@@ -162,7 +162,10 @@ def _wait_until_whole(made: Deployment) -> None:
     with GatewayClient(made.target) as client:
 
         def is_whole() -> bool:
-            status = client.status()
+            try:
+                status = client.status()
+            except Unreachable:
+                return False  # It does not listen yet.
             return bool(
                 status.preview.service_reachable
                 and status.odometry.available
