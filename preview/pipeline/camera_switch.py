@@ -150,6 +150,9 @@ class Candidate:
         """
         self._gate.remove()
         await dispose(self._parts.pipeline, self.source, deadline_s)
+        # Not before: it keeps frames from a pad that leads nowhere. With it, pad and candidate, and so the
+        # whole pipeline, would keep each other alive.
+        self._pad.remove_probe(self._valve)
 
     def _drop(self, _pad: Any, info: Any) -> Any:
         """Drops what comes before it is linked, on the candidate's thread."""

@@ -115,6 +115,12 @@ class LiveCamera:
         if self._task:
             await end([self._task])
 
+    def release(self) -> None:
+        """Watches nothing any more, and drops every reference to the pipeline; after `close`."""
+        self.detach()
+        # A cancelled task keeps its frames, and with them the candidate that was being started.
+        self._task = self._took_over = None
+
     def detach(self) -> None:
         """Watches the live camera no longer."""
         self._source_end.detach()

@@ -233,7 +233,7 @@ class Runner:
         self.record(None)
         self._keyframe_gate.detach()
         self._framing.detach()
-        self._camera.detach()
+        self._camera.release()
         last = [self._running.parts.pipeline]
         del self._running.parts, self._bus
         return last

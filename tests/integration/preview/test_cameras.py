@@ -126,6 +126,23 @@ def test_a_camera_that_was_left_is_closed(tmp_path: Path) -> None:
         assert preview.running().counters == pb.Counters(starts=1)
 
 
+def test_a_camera_that_was_still_being_started_leaves_nothing(tmp_path: Path) -> None:
+    with RunningPreview(tmp_path, cameras(red=RED, green=GREEN)) as preview:
+
+        def change_and_end() -> None:
+            choose(preview, "red")
+            preview.running()
+            choose(preview, "green")
+            preview.disable()
+            preview.disabled()
+
+        change_and_end()
+        before = preview.descriptors()
+        for _ in range(4):
+            change_and_end()
+        wait_until(lambda: preview.descriptors() <= before, "no more descriptors than before")
+
+
 def test_a_camera_that_fails_to_start_costs_the_live_one_nothing(tmp_path: Path) -> None:
     settings = cameras(
         red=RED,
