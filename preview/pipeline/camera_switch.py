@@ -21,6 +21,7 @@ Python runs per frame only during these steps.
 import asyncio
 import threading
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Final
 
 from common.gst import Gst, stop_element
@@ -66,6 +67,9 @@ class Candidate:
         self.source.set_locked_state(True)
         self._pad = self.source.get_static_pad("src")
         self._gate = _Gate(parts.body_pad)
+        self._state = threading.Lock()
+        """Held while it is started, and while it is stopped."""
+        self._stopped = False
         self._valve = self._pad.add_probe(_BUFFERS | Gst.PadProbeType.EVENT_DOWNSTREAM, self._drop)
         parts.pipeline.add(self.source)
 
@@ -93,8 +97,11 @@ class Candidate:
         source_end = source.get_by_name(builder.SOURCE_END)
 
         def start() -> bool:
-            outcome = capture_clock.play_beside(pipeline, source, source_end)
-            return bool(outcome != Gst.StateChangeReturn.FAILURE)
+            with self._state:
+                if self._stopped:
+                    return True
+                outcome = capture_clock.play_beside(pipeline, source, source_end)
+                return bool(outcome != Gst.StateChangeReturn.FAILURE)
 
         try:
             async with asyncio.timeout(deadline_s):
@@ -149,7 +156,14 @@ class Candidate:
             TimeoutError: it hangs; it stays in the pipeline.
         """
         self._gate.remove()
-        await dispose(self._parts.pipeline, self.source, deadline_s)
+
+        def work() -> None:
+            # A start whose waiter was cancelled would set it to play after this.
+            with self._state:
+                self._stopped = True
+                _remove(self._parts.pipeline, self.source)
+
+        await in_thread(work, deadline_s)
         # Not before: it keeps frames from a pad that leads nowhere. With it, pad and candidate, and so the
         # whole pipeline, would keep each other alive.
         self._pad.remove_probe(self._valve)
@@ -225,12 +239,12 @@ async def dispose(pipeline: Any, source: Any, deadline_s: float) -> None:
     Raises:
         TimeoutError: it hangs; it stays in the pipeline.
     """
+    await in_thread(partial(_remove, pipeline, source), deadline_s)
 
-    def work() -> None:
-        stop_element(source)
-        pipeline.remove(source)
 
-    await in_thread(work, deadline_s)
+def _remove(pipeline: Any, source: Any) -> None:
+    stop_element(source)
+    pipeline.remove(source)
 
 
 def _relink(old_pad: Any, pad: Any, body_pad: Any) -> Any:
