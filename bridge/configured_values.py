@@ -97,6 +97,7 @@ def _number(value: NumberStatus) -> NumberStatus:
         age_ms=value.age_ms,
         unit=value.unit[:_UNIT_CHARACTERS],
         level=value.level,
+        tile=value.tile,
     )
     if value.HasField("value"):
         made.value = value.value

@@ -12,6 +12,8 @@ from gateway.status.meaning import TextMeaning
 
 MOST_GENERIC: Final = 64
 """Generic sources of one gateway: each is a subscription, and a row for the operator."""
+MOST_TILES: Final = 6
+"""Tiles that a window shows over its picture; of more the first ones."""
 _LABEL: Final = re.compile(r"[a-z][a-z0-9_]{0,39}")
 _LONGEST_PATH: Final = 200
 _MOST_STEPS: Final = 16
@@ -27,7 +29,7 @@ _BOTH: Final = frozenset({"number", "text"})
 _NUMBER: Final = frozenset({"number"})
 _TEXT: Final = frozenset({"text"})
 KINDS_OF_KEY: Final[Mapping[str, frozenset[str]]] = {
-    **dict.fromkeys(("title", "field", "remedy"), _BOTH),
+    **dict.fromkeys(("title", "field", "remedy", "tile"), _BOTH),
     **dict.fromkeys(("unit", "scale", "offset", "decimals"), _NUMBER),
     **dict.fromkeys(("warning_below", "error_below", "warning_above", "error_above"), _NUMBER),
     **dict.fromkeys(("max_length", "names", "levels", "other_level"), _TEXT),
@@ -118,10 +120,10 @@ def check_order(
         )
 
 
-def text_meaning(levels: Mapping[str, Level], other: Level, remedy: str) -> TextMeaning:
+def text_meaning(levels: Mapping[str, Level], other: Level, remedy: str, *, tile: bool) -> TextMeaning:
     """Returns the levels in the form that the fault rules take."""
     listed = tuple((text, _SEVERITIES[level]) for text, level in levels.items())
-    return TextMeaning(listed, _SEVERITIES[other], remedy)
+    return TextMeaning(listed, _SEVERITIES[other], remedy, tile)
 
 
 def check_words(words: Iterable[str], max_length: int) -> None:

@@ -12,7 +12,7 @@ from common.addresses import is_loopback
 from common.config import Section, Settings, SettingsConflictError, load
 from common.metrics_settings import MetricsSettings, check_metrics
 from gateway.config.faults import FaultSettings
-from gateway.config.generic_sources import MOST_GENERIC
+from gateway.config.generic_sources import MOST_GENERIC, MOST_TILES
 from gateway.config.links import BridgeSettings, PreviewSettings, RecordingSettings, TeleopSettings
 from gateway.config.security import SecuritySettings
 from gateway.config.serving import (
@@ -117,6 +117,9 @@ def without_effect(settings: GatewaySettings) -> Iterator[str]:
                 f"faults.ignored_by_health has no effect for '{rule}': no fault of this configuration has "
                 f"that ID, or begins with it{hint}"
             )
+    tiles = [source.name for source in settings.sources if source.tile]
+    for name in tiles[MOST_TILES:]:
+        yield f"sources[].tile has no effect for '{name}': windows show the first {MOST_TILES} tiles alone"
 
 
 def _check_exposure(settings: GatewaySettings) -> None:

@@ -73,6 +73,8 @@ class SourceSettings(Section):
     type: Annotated[str, AfterValidator(_type_name)]
     field: FieldPath | None = None
     """The field of the message that a generic value is."""
+    tile: bool = False
+    """Whether operators' windows show a generic value over the picture, too."""
     reliability: Literal["best_effort", "reliable"] = "best_effort"
     durability: Literal["volatile", "transient_local"] = "volatile"
     stale_after_ms: int = Field(default_factory=lambda validated: _STALE_AFTER_MS[validated["kind"]], gt=0)
@@ -116,7 +118,7 @@ class SourceSettings(Section):
         if self.kind == "number":
             return number_source(self.label or "", self.title, self._meaning())
         if self.kind == "text":
-            meaning = text_meaning(self.levels, self.other_level, self.remedy)
+            meaning = text_meaning(self.levels, self.other_level, self.remedy, tile=self.tile)
             return text_source(self.label or "", self.title, meaning)
         return _SPECS[self.kind, self.label]
 
@@ -160,6 +162,7 @@ class SourceSettings(Section):
             warning_above=self.warning_above.limit() if self.warning_above else None,
             error_above=self.error_above.limit() if self.error_above else None,
             remedy=self.remedy,
+            tile=self.tile,
         )
 
 

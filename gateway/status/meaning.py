@@ -37,6 +37,7 @@ class NumberMeaning:
         warning_above: upper limits that are broken by large values.
         error_above: the same, for an error.
         remedy: what to do when a limit is broken; empty for a general sentence.
+        tile: whether operators' windows show it over the picture, too.
     """
 
     unit: str = ""
@@ -46,6 +47,7 @@ class NumberMeaning:
     warning_above: Limit | None = None
     error_above: Limit | None = None
     remedy: str = ""
+    tile: bool = False
 
     def violation(self, value: float, before: Mapping[Side, Severity]) -> Violation | None:
         """Returns the limit that a value violates, the more severe one of two; None if it is good.
@@ -82,11 +84,13 @@ class TextMeaning:
         levels: severities of texts, None of those that are good.
         other: severity of every other text; None if they are good.
         remedy: what to do about a bad one; empty for a general sentence.
+        tile: as of a number.
     """
 
     levels: tuple[tuple[str, Severity | None], ...] = ()
     other: Severity | None = None
     remedy: str = ""
+    tile: bool = False
 
     def severity(self, text: str) -> Severity | None:
         """Returns how bad a text is; None if it is good."""

@@ -432,7 +432,8 @@ ADDITIONS = [
         + uint(4, 1)
         + uint(5, 40)
         + text(6, "jam")
-        + uint(7, 3),
+        + uint(7, 3)
+        + uint(8, 1),
         {
             "label": "gripper",
             "title": "Gripper",
@@ -441,6 +442,7 @@ ADDITIONS = [
             "age_ms": 40,
             "text": "jam",
             "level": value_pb2.TEXT_LEVEL_ERROR,
+            "tile": True,
         },
     ),
     Case(
@@ -457,7 +459,8 @@ ADDITIONS = [
         + dbl(10, 3.0)
         + dbl(11, 3.4)
         + dbl(12, 4.1)
-        + dbl(13, 4.3),
+        + dbl(13, 4.3)
+        + uint(14, 1),
         {
             "label": "cell",
             "title": "Cell 3",
@@ -472,6 +475,7 @@ ADDITIONS = [
             "warning_below": 3.4,
             "warning_above": 4.1,
             "error_above": 4.3,
+            "tile": True,
         },
     ),
     Case(system_status_pb2.VisionStatus, uint(16, 70), {"age_ms": 70}),

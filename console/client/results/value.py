@@ -40,6 +40,8 @@ class TextValue(Sample):
     text: str | None
     """One line. None also where the newest message holds no text."""
     level: TextLevel
+    tile: bool
+    """Whether the robot's configuration wants it shown over the picture, too."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,3 +65,5 @@ class NumberValue(Sample):
     warning_above: float | None
     """From this number on, upwards, it is a warning."""
     error_above: float | None
+    tile: bool
+    """As of a text."""

@@ -30,6 +30,7 @@ def _fill_number(
     message.title = spec.display_name
     message.available, message.stale, message.age_ms = sample.freshness
     message.unit = meaning.unit
+    message.tile = meaning.tile
     if value is not None:
         message.value = value
         message.level = value_pb2.NUMBER_LEVEL_GOOD
@@ -51,6 +52,7 @@ def _fill_text(
     message.label = spec.label or ""
     message.title = spec.display_name
     message.available, message.stale, message.age_ms = sample.freshness
+    message.tile = meaning.tile
     if text is not None:
         message.text = text
         message.level = value_pb2.TEXT_LEVEL_GOOD

@@ -32,6 +32,7 @@ def number(label: str = "motor", **changes: object) -> value_pb2.NumberStatus:
         decimals=1,
         level=value_pb2.NUMBER_LEVEL_GOOD,
         error_above=90,
+        tile=True,
     )
     made.MergeFrom(value_pb2.NumberStatus(**changes))  # type: ignore[arg-type]
     return made
@@ -41,7 +42,12 @@ def status() -> SystemStatus:
     made = SystemStatus()
     made.numbers.append(number())
     made.texts.add(
-        label="gripper", title="Gripper", available=True, text="open", level=value_pb2.TEXT_LEVEL_GOOD
+        label="gripper",
+        title="Gripper",
+        available=True,
+        text="open",
+        level=value_pb2.TEXT_LEVEL_GOOD,
+        tile=True,
     )
     made.position.CopyFrom(
         pose_pb2.PositionStatus(
@@ -61,6 +67,8 @@ def test_every_kind_of_value_is_in_the_state() -> None:
         "motor", "Motor", 61.25, "°C", 1,
     )  # fmt: skip
     assert (motor.available, motor.stale, motor.age_ms) == (True, False, 40)
+    assert motor.tile
+    assert gripper.tile
     # Limits are the robot's own matter: what follows from them is the level.
     assert not motor.HasField("error_above")
     assert (gripper.label, gripper.title, gripper.text) == ("gripper", "Gripper", "open")

@@ -77,6 +77,10 @@ def test_the_environment_overrides_the_file(tmp_path: Path, monkeypatch: pytest.
             "expected: a topic name",
         ),
         (f"sources: [{NUMBER}}}]", "needs 'field'"),
+        (
+            "sources: [{kind: odometry, topic: /a, type: n/msg/O, tile: true}]",
+            "has no key 'tile', which is of kind number or text",
+        ),
         (f"sources: [{NUMBER}, field: a..b}}]", "expected: a field of the message"),
         (f"sources: [{NUMBER}, field: _x}}]", "expected: a field of the message"),
         (f"sources: [{NUMBER}, field: 'a[-1]'}}]", "expected: a field of the message"),

@@ -100,6 +100,7 @@ class NumberStatus(_message.Message):
     WARNING_BELOW_FIELD_NUMBER: _builtins.int
     WARNING_ABOVE_FIELD_NUMBER: _builtins.int
     ERROR_ABOVE_FIELD_NUMBER: _builtins.int
+    TILE_FIELD_NUMBER: _builtins.int
     label: _builtins.str
     """Short and stable: "motor_temperature". SystemStatus.sources has its state as "number.motor_temperature"."""
     title: _builtins.str
@@ -128,6 +129,8 @@ class NumberStatus(_message.Message):
     """From this number on, upwards, it is a warning. Unset: there is no such limit."""
     error_above: _builtins.float
     """From this number on, upwards, it is an error. Unset: there is no such limit."""
+    tile: _builtins.bool
+    """Whether the robot's configuration asks windows to show it over the picture, too, as a tile."""
     def __init__(
         self,
         *,
@@ -144,10 +147,11 @@ class NumberStatus(_message.Message):
         warning_below: _builtins.float | None = ...,
         warning_above: _builtins.float | None = ...,
         error_above: _builtins.float | None = ...,
+        tile: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_decimals", b"_decimals", "_error_above", b"_error_above", "_error_below", b"_error_below", "_value", b"_value", "_warning_above", b"_warning_above", "_warning_below", b"_warning_below", "decimals", b"decimals", "error_above", b"error_above", "error_below", b"error_below", "value", b"value", "warning_above", b"warning_above", "warning_below", b"warning_below"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_decimals", b"_decimals", "_error_above", b"_error_above", "_error_below", b"_error_below", "_value", b"_value", "_warning_above", b"_warning_above", "_warning_below", b"_warning_below", "age_ms", b"age_ms", "available", b"available", "decimals", b"decimals", "error_above", b"error_above", "error_below", b"error_below", "label", b"label", "level", b"level", "stale", b"stale", "title", b"title", "unit", b"unit", "value", b"value", "warning_above", b"warning_above", "warning_below", b"warning_below"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_decimals", b"_decimals", "_error_above", b"_error_above", "_error_below", b"_error_below", "_value", b"_value", "_warning_above", b"_warning_above", "_warning_below", b"_warning_below", "age_ms", b"age_ms", "available", b"available", "decimals", b"decimals", "error_above", b"error_above", "error_below", b"error_below", "label", b"label", "level", b"level", "stale", b"stale", "tile", b"tile", "title", b"title", "unit", b"unit", "value", b"value", "warning_above", b"warning_above", "warning_below", b"warning_below"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__decimals: _TypeAlias = _typing.Literal["decimals"]  # noqa: Y015
     _WhichOneofArgType__decimals: _TypeAlias = _typing.Literal["_decimals", b"_decimals"]  # noqa: Y015
@@ -189,6 +193,7 @@ class TextStatus(_message.Message):
     AGE_MS_FIELD_NUMBER: _builtins.int
     TEXT_FIELD_NUMBER: _builtins.int
     LEVEL_FIELD_NUMBER: _builtins.int
+    TILE_FIELD_NUMBER: _builtins.int
     label: _builtins.str
     """Short and stable: "gripper". SystemStatus.sources has its state as "text.gripper"."""
     title: _builtins.str
@@ -205,6 +210,8 @@ class TextStatus(_message.Message):
     """
     level: Global___TextLevel.ValueType
     """How bad it is; that of the last known text while no newer one comes."""
+    tile: _builtins.bool
+    """Whether the robot's configuration asks windows to show it over the picture, too, as a tile."""
     def __init__(
         self,
         *,
@@ -215,10 +222,11 @@ class TextStatus(_message.Message):
         age_ms: _builtins.int = ...,
         text: _builtins.str | None = ...,
         level: Global___TextLevel.ValueType = ...,
+        tile: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_text", b"_text", "text", b"text"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_text", b"_text", "age_ms", b"age_ms", "available", b"available", "label", b"label", "level", b"level", "stale", b"stale", "text", b"text", "title", b"title"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_text", b"_text", "age_ms", b"age_ms", "available", b"available", "label", b"label", "level", b"level", "stale", b"stale", "text", b"text", "tile", b"tile", "title", b"title"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__text: _TypeAlias = _typing.Literal["text"]  # noqa: Y015
     _WhichOneofArgType__text: _TypeAlias = _typing.Literal["_text", b"_text"]  # noqa: Y015

@@ -199,11 +199,11 @@ STALE = SourceRule(1000, required=False)
 CELL = number_source(
     "cell",
     "Cell 3",
-    NumberMeaning("V", 2, Limit(3.3, 3.4), Limit(3.0, 3.1), Limit(4.1, 4.0), Limit(4.3, 4.2)),
+    NumberMeaning("V", 2, Limit(3.3, 3.4), Limit(3.0, 3.1), Limit(4.1, 4.0), Limit(4.3, 4.2), tile=True),
 )
 
 
-GRIPPER = text_source("gripper", "Gripper", TextMeaning())
+GRIPPER = text_source("gripper", "Gripper", TextMeaning(tile=True))
 
 
 def everything() -> Snapshot:

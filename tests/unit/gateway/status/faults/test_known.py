@@ -84,6 +84,15 @@ def test_the_defaults_have_an_effect() -> None:
     assert list(without_effect(load_settings(None))) == []
 
 
+def test_tiles_beyond_those_that_windows_show_are_named(tmp_path: Path) -> None:
+    file = tmp_path / "gateway.yaml"
+    tile = "{{kind: number, topic: /a, type: n/msg/O, label: n{}, field: a, tile: true}}"
+    file.write_text("sources:\n" + "".join(f"- {tile.format(n)}\n" for n in range(8)), encoding="utf-8")
+    sentences = list(without_effect(load_settings(file)))
+    assert [sentence.split("'")[1] for sentence in sentences] == ["number.n6", "number.n7"]
+    assert all("windows show the first 6 tiles alone" in sentence for sentence in sentences)
+
+
 def test_a_rule_that_can_be_no_id_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UserError):
         loaded(tmp_path, "Lidar*")
