@@ -18,7 +18,7 @@ _TEXT_PX: Final = 13
 _BAR_PX: Final = 18.0
 _BAR_LEFT_PX: Final = 62.0
 _BAR_RIGHT_PX: Final = 96.0
-_GROUND: Final = QColor(16, 18, 20, 215)
+DENSE_GROUND: Final = QColor(16, 18, 20, 215)
 """Darker than the gauges': there is more to read."""
 _NOW: Final = QColor(255, 255, 255, 95)
 
@@ -49,7 +49,7 @@ class DriveHud(Overlay):
         if display is None:
             return
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(_GROUND)
+        painter.setBrush(DENSE_GROUND)
         painter.drawRoundedRect(QRectF(self.rect()), 6, 6)
         colour = COLOURS.get(display.style, INK)
         if display.style in (SeverityStyle.WARNING, SeverityStyle.BAD):

@@ -16,6 +16,7 @@ from console.monitor.monitor_state import MonitorState, PreviewRequest
 from console.monitor.motion import Motion, motion
 from console.monitor.status_rows import FaultItem
 from console.monitor.trail import Trail
+from console.monitor.value_tiles import tile_items
 from console.monitor.worker import Worker
 from console.presentation.own_stream import OwnStream  # noqa: TC001  # read by the type checker alone
 from console.presentation.picture_age import PictureAge, reported_age
@@ -139,6 +140,7 @@ class MonitorWindow(QWidget):
             self._trail.add(state.snapshot.status.odometry, state.received_s)
         self._motion = motion(state, now_s, self._motion)
         self.picture.show_motion(self._motion, self._trail)
+        self.picture.show_values(tile_items(state, now_s))
         self.sound.check(now_s)
 
     # Actions of the keys and buttons.

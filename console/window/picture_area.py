@@ -1,4 +1,4 @@
-"""The picture, edge to edge, with what lies over it: driving, gauges, trail, recorder, messages, keys."""
+"""The picture, edge to edge, and what lies over it: driving, gauges, values, trail, recorder, messages."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from console.monitor.bar_items import BarItem
 from console.monitor.motion import Motion
 from console.monitor.trail import Trail
+from console.monitor.value_tiles import TileItem
 from console.presentation.drive_display import DriveDisplay
 from console.window.connection_banner import ConnectionBanner
 from console.window.drive_hud import DriveHud
@@ -21,6 +22,7 @@ from console.window.record_tile import RecordTile
 from console.window.theme import COCKPIT
 from console.window.toasts import Toasts
 from console.window.trail_view import TrailView
+from console.window.value_tiles import ValueTiles
 from console.window.video_view import VideoView
 
 _EDGE_PX: Final = 8
@@ -28,6 +30,10 @@ _GAUGE_SHARE: Final = 1 / 6
 _SMALLEST_GAUGE_PX: Final = 64
 _LARGEST_GAUGE_PX: Final = 140
 _WIDEST_MESSAGE_PX: Final = 560
+_TILE_SHARE: Final = 1 / 6
+_NARROWEST_TILE_PX: Final = 172
+_WIDEST_TILE_PX: Final = 208
+_MOST_TILE_SHARE: Final = 1 / 4
 
 
 class PictureArea(QWidget):
@@ -47,8 +53,9 @@ class PictureArea(QWidget):
         self.trail, self._trail_place = TrailView(), QRect()
         self.hud, self._corner = DriveHud(), QPoint()
         self.recorder = RecordTile()
+        self.values, self._values_place = ValueTiles(), QRect()
         fill(QVBoxLayout(self), (video, 1))
-        corners = (self.speed, self.turn, self.trail, self.hud, self.recorder)
+        corners = (self.speed, self.turn, self.values, self.trail, self.hud, self.recorder)
         for overlay in (*corners, self.toasts, self.banner, self.key_help):
             overlay.setParent(self)
         # Not inside the paint event that found the new shape.
@@ -78,6 +85,13 @@ class PictureArea(QWidget):
         self.recorder.show_item(item)
         self._place_messages()
 
+    def show_values(self, items: Sequence[TileItem]) -> None:
+        """Shows the tiles of the values that the robot's configuration wants here."""
+        were_hidden = self.values.isHidden()
+        self.values.show_items(items)
+        if self.values.isHidden() is not were_hidden:
+            self._place_messages()
+
     def place(self) -> None:
         """Places everything anew."""
         box = self.video.frame_box()
@@ -88,7 +102,8 @@ class PictureArea(QWidget):
         self.turn.setGeometry(right - side, bottom - side, side, side)
         self._trail_place = QRect(right - side, top, side, side)
         self._corner = QPoint(left, top)
-        self.video.keep_clear(side + 2 * _EDGE_PX)
+        width = max(_NARROWEST_TILE_PX, min(_WIDEST_TILE_PX, round(box.width * _TILE_SHARE)))
+        self._values_place = QRect(left, top, min(width, round(box.width * _MOST_TILE_SHARE)), bottom - top)
         self._place_messages()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
@@ -113,10 +128,24 @@ class PictureArea(QWidget):
         right, below = self._trail_place.right() + 1, self.trail.geometry().bottom() + 1 + _EDGE_PX
         self.recorder.setGeometry(right - tile.width(), below, tile.width(), tile.height())
         self.hud.move(self._corner.x(), max(self._corner.y(), top + _EDGE_PX))
-        # Beside the head-up display where there is room: an answer must not cover who drives.
-        left = 0 if self.hud.isHidden() else self.hud.geometry().right()
+        self._place_values(top + _EDGE_PX)
+        # Beside the head-up display and the tiles: an answer must not cover who drives, nor a value.
+        shown = [part for part in (self.hud, self.values) if not part.isHidden()]
+        left = max((part.geometry().right() for part in shown), default=0)
         room = min(_WIDEST_MESSAGE_PX, width - left - 2 * _EDGE_PX)
         height = self.toasts.height_for(room)
         middle = max((width - room) // 2, left + _EDGE_PX)
         self.toasts.setGeometry(middle, top + _EDGE_PX, room, min(height, self.height() // 2))
         self.key_help.fit(self.size())
+
+    def _place_values(self, top: int) -> None:
+        """Gives the tiles what is left between the head-up display and the gauge, and the banner the rest."""
+        gauge, room = self.speed.geometry(), QRect(self._values_place)
+        if not self.speed.isHidden():
+            room.setBottom(gauge.top() - 1 - _EDGE_PX)
+        room.setTop(max(room.top(), top))
+        if not self.hud.isHidden():
+            room.setTop(self.hud.geometry().bottom() + 1 + _EDGE_PX)
+        self.values.setGeometry(room)
+        column = 0 if self.values.isHidden() else room.right() + 1 + _EDGE_PX
+        self.video.keep_clear(max(gauge.right() + 1 + _EDGE_PX, column), column)

@@ -67,7 +67,7 @@ class VideoView(QWidget):
         """The frame whose age was noted; None while none can be seen."""
         self._banner: Banner | None = banner(session.playback())
         self._shape = (0, 0)
-        self._clear_px = 0
+        self._clear_px = (0, 0)
         self._handover = ThreadHandover(self)
         self._handover.delivered.connect(self.update)
         session.add_frame_listener(self._make_ready)
@@ -100,10 +100,16 @@ class VideoView(QWidget):
         width, height = self._shape
         return width / height if height else _USUAL_SIZE.width() / _USUAL_SIZE.height()
 
-    def keep_clear(self, room_px: int) -> None:
-        """Keeps the banner out of so much room beside it, where other things lie over the picture."""
-        self._clear_px = room_px
-        self.update()
+    def keep_clear(self, beside_px: int, middle_px: int = 0) -> None:
+        """Keeps the banner out of so much room at both sides, where other things lie over the picture.
+
+        Args:
+            beside_px: at the lower edge, where the banner lies over a frame.
+            middle_px: in the middle, where it stands without a frame.
+        """
+        if (beside_px, middle_px) != self._clear_px:
+            self._clear_px = beside_px, middle_px
+            self.update()
 
     def frame_box(self) -> Box:
         """Returns where the frame is shown; without one the whole widget."""
@@ -141,7 +147,7 @@ class VideoView(QWidget):
             if self.age_shown and self._age:
                 self._age.paint(painter, QRectF(self.rect()))
         if text := banner(playback):
-            clear = self._clear_px if shown else 0
+            clear = self._clear_px[0 if shown else 1]
             room = QRectF(self.rect()).adjusted(clear, 0, -clear, 0)
             draw_banner(painter, room, text, over_frame=shown is not None)
         painter.end()

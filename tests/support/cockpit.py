@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from omniseer.gateway.v1 import preview_pb2, recording_pb2
+from omniseer.gateway.v1 import preview_pb2, recording_pb2, value_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.gateway_double import StreamingGatewayDouble, serving
 from tests.support.running_preview import RunningPreview
@@ -88,6 +88,45 @@ def with_teleop(double: StreamingGatewayDouble) -> None:
     teleop = double.status.teleop
     teleop.state, teleop.enabled = states.TELEOP_ENABLED, True
     teleop.max_linear_mps, teleop.max_angular_rad_s = 0.8, 1.5
+
+
+def with_tiles(double: StreamingGatewayDouble) -> None:
+    """Makes it a robot with six values over the picture: good, bad, old and missing ones."""
+    status = double.status
+    numbers = (
+        ("left_motor", "Left motor temperature", 96.0, "\u00b0C", 1, value_pb2.NUMBER_LEVEL_ERROR_HIGH),
+        ("cell_3", "Cell 3", 3.31, "V", 2, value_pb2.NUMBER_LEVEL_WARNING_LOW),
+        ("co2", "CO2", 412.0, "ppm", 0, value_pb2.NUMBER_LEVEL_GOOD),
+    )
+    for label, title, value, unit, decimals, level in numbers:
+        status.numbers.add(
+            label=label,
+            title=title,
+            available=True,
+            age_ms=40,
+            value=value,
+            unit=unit,
+            decimals=decimals,
+            level=level,
+            tile=True,
+        )
+    status.numbers.add(label="winch", title="Winch load", unit="kg", tile=True)
+    old = status.numbers.add(label="depth", title="Depth", available=True, stale=True, age_ms=125_000)
+    old.value, old.unit, old.decimals, old.tile = 1.25, "m", 2, True
+    status.texts.add(
+        label="gripper",
+        title="Gripper",
+        available=True,
+        age_ms=400_000,
+        text="holding parcel 12, waiting for the lift",
+        level=value_pb2.TEXT_LEVEL_GOOD,
+        tile=True,
+    )
+    for name in ("left_motor", "cell_3"):
+        status.sources.add(name=f"number.{name}")
+    status.sources.add(name="text.gripper")
+    for name in ("co2", "winch", "depth"):
+        status.sources.add(name=f"number.{name}")
 
 
 def with_recorder(double: StreamingGatewayDouble) -> None:

@@ -13,7 +13,17 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-_SITUATIONS: Final = ("cockpit", "panel-closed", "trouble", "driving", "recording", "dark", "view")
+_SITUATIONS: Final = (
+    "cockpit",
+    "panel-closed",
+    "trouble",
+    "driving",
+    "tiles",
+    "tiles-driving",
+    "recording",
+    "dark",
+    "view",
+)
 _FRAMES: Final = 5
 _HISTORY_S: Final = 4.0
 """Until the trail is visible, and the plots have a curve."""
@@ -60,7 +70,7 @@ def main() -> None:
 def _cockpit(situation: str, directory: Path, file: Path) -> Mapping[str, Any]:
     from console.window.programs import monitor  # noqa: PLC0415
     from console.window.side_panel import TABS  # noqa: PLC0415
-    from tests.support.cockpit import seeing_robot, with_recorder, with_teleop, with_trouble  # noqa: PLC0415
+    from tests.support.cockpit import seeing_robot, with_recorder, with_teleop, with_tiles, with_trouble  # noqa: PLC0415
     from tests.support.qt import let_pass, until  # noqa: PLC0415
 
     with seeing_robot(directory) as robot, monitor(robot.target) as window, _frames(window.video) as frames:
@@ -68,8 +78,11 @@ def _cockpit(situation: str, directory: Path, file: Path) -> Mapping[str, Any]:
         let_pass(_HISTORY_S)
         if situation == "trouble":
             with_trouble(robot.gateway)
-        if situation in ("trouble", "driving"):
+        if situation in ("trouble", "driving", "tiles-driving"):
             with_teleop(robot.gateway)
+        if situation in ("tiles", "tiles-driving"):
+            with_tiles(robot.gateway)
+            until(lambda: not window.picture.values.isHidden(), "the tiles")
         if situation == "recording":
             with_recorder(robot.gateway)
             until(lambda: not window.recording.absent, "the recorder")
