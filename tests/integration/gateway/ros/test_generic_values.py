@@ -175,6 +175,7 @@ SOURCES = [
         warning_above={"raise_at": 80, "clear_at": 75},
         error_above={"raise_at": 95, "clear_at": 90},
         remedy="Let it cool down",
+        tile=True,
     ),
     {
         "kind": "text",
@@ -228,6 +229,7 @@ def test_from_the_configuration_to_the_operator(talker: Talker, tmp_path: Path) 
         assert "Let it cool down" in table
         document = json.loads(robotctl_process(*target, "status", "--json").stdout)
         assert document["numbers"][0]["level"] == "error_high"
+        assert [each["tile"] for each in (*document["numbers"], *document["texts"])] == [True, False, False]
 
         page = urllib.request.urlopen(f"http://127.0.0.1:{metrics}/metrics", timeout=5).read().decode()
         assert 'robot_gateway_number{source="number.left_motor",unit="°C"} 96.0' in page
