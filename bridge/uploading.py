@@ -132,8 +132,12 @@ class QueuedUploads:
             if len(chosen) == MOST_COPIES:
                 break
             chosen.setdefault(each.recording_id, each)
+        now_s = asyncio.get_running_loop().time()
         return [
-            bridge_pb.CopyReport(recording_id=each.recording_id, copy=_copy(each)) for each in chosen.values()
+            bridge_pb.CopyReport(
+                recording_id=each.recording_id, copy=_copy(each), state_age_ms=_state_age_ms(each, now_s)
+            )
+            for each in chosen.values()
         ]
 
     async def enqueue(self, recording_id: str) -> recording_pb.RecordingCopy:
@@ -173,6 +177,10 @@ def _copy(upload: Upload) -> recording_pb.RecordingCopy:
     return recording_pb.RecordingCopy(
         state=STATES[upload.state], reason=upload.reason, bytes_done=upload.bytes_done
     )
+
+
+def _state_age_ms(upload: Upload, now_s: float) -> int | None:
+    return None if upload.since_s is None else round((now_s - upload.since_s) * 1000)
 
 
 def _no_answer(error: GatewayError) -> DomainError:

@@ -52,7 +52,7 @@ class StoredUploads:
 def _row(upload: Upload) -> str:
     values: dict[str, Any] = asdict(upload)
     # Of this run alone.
-    del values["due_s"], values["cuts"]
+    del values["due_s"], values["since_s"], values["cuts"]
     values |= {
         "priority": upload.priority.name,
         "state": upload.state.name,

@@ -163,6 +163,7 @@ class Upload:
         failures: FAILURE events in succession.
         cuts: CUT events in succession, without progress; not kept over a restart.
         due_s: When a failed one is tried again; monotonic seconds, and so not kept over a restart.
+        since_s: Since when it has its state; None where that was before the start. As `due_s`.
     """
 
     recording_id: str
@@ -177,6 +178,7 @@ class Upload:
     failures: int = 0
     cuts: int = 0
     due_s: float = 0.0
+    since_s: float | None = None
 
     @property
     def order(self) -> tuple[Priority, int, str]:
@@ -188,7 +190,7 @@ class UploadStore(Protocol):
     """Keeps the queue over restarts and power failures: one row for each recording."""
 
     async def uploads(self) -> list[Upload]:
-        """Returns all rows, with `due_s` 0.
+        """Returns all rows, without what is not kept over a restart.
 
         Raises:
             OSError: The disk can't be read.
@@ -224,7 +226,7 @@ def step(upload: Upload, event: Event, now_s: float, reason: str = "") -> Upload
     state = TRANSITIONS[upload.state].get(event)
     if state is None:
         raise IllegalEventError(upload.state, event)
-    changed = replace(upload, state=state)
+    changed = upload if state is upload.state else replace(upload, state=state, since_s=now_s)
     match event:
         case Event.FAILURE:
             changed = _failed(changed, reason, now_s)

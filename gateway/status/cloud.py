@@ -48,10 +48,15 @@ class RecordingCopy:
 
 @dataclass(frozen=True, slots=True)
 class CopyReport:
-    """The copy of one recording."""
+    """The copy of one recording.
+
+    Attributes:
+        since_s: since when it is in its state; None where that was before the bridge started.
+    """
 
     recording_id: str
     copy: RecordingCopy
+    since_s: float | None = None
 
 
 class HubAction(Enum):

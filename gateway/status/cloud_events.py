@@ -30,7 +30,10 @@ _ENDS: Final = frozenset({RecordingCopyState.VERIFIED, RecordingCopyState.FAILED
 
 
 class CloudEvents:
-    """Compares each view with those before. The first settled state and the first copies are no events."""
+    """Compares each view with those before. The first settled state and the first copies are no events.
+
+    Nor is a copy that ended before the first report, which has room for few: others come later.
+    """
 
     def __init__(self) -> None:
         self._state: CloudState | None = None
@@ -39,7 +42,8 @@ class CloudEvents:
         """None before the first."""
         self._ends: OrderedDict[str, RecordingCopyState] = OrderedDict()
         """The newest event of a recording's copy."""
-        self._has_baseline = False
+        self._began_s: float | None = None
+        """When the first report was seen."""
         self._bucket = TokenBucket(BURST, 0.0)
 
     def take(self, view: CloudView, recorder: RecorderView | None, now_s: float) -> Iterator[Event]:
@@ -63,11 +67,13 @@ class CloudEvents:
     def _copies(
         self, copies: tuple[CopyReport, ...], recorder: RecorderView | None, now_s: float
     ) -> Iterator[Event]:
+        first = self._began_s is None
+        began_s = self._began_s = now_s if self._began_s is None else self._began_s
         for each in copies:
             state, known = each.copy.state, self._ends.get(each.recording_id)
             if state not in _ENDS or state is known:
                 continue
-            if self._has_baseline:
+            if not first and each.since_s is not None and each.since_s >= began_s:
                 if not self._bucket.take(now_s, capacity=BURST, refill_per_s=1.0):
                     return
                 yield _copied(each, _label(recorder, each.recording_id))
@@ -75,7 +81,6 @@ class CloudEvents:
             self._ends.move_to_end(each.recording_id)
             if len(self._ends) > REMEMBERED:
                 self._ends.popitem(last=False)
-        self._has_baseline = True
 
 
 def _changed(state: CloudState, last_error: str) -> Event:

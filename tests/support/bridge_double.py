@@ -69,7 +69,7 @@ class BridgeDouble(BridgeServiceServicer):
         for each in self.report.copies:
             if each.recording_id == recording_id:
                 return each.copy
-        return self.report.copies.add(recording_id=recording_id).copy
+        return self.report.copies.add(recording_id=recording_id, state_age_ms=0).copy
 
     def request(self, request_id: str, remaining_ms: int = 60_000, **more: Any) -> pb.HubRequest:
         """Passes a request of the hub on; `more` has its action."""

@@ -127,7 +127,7 @@ def report_from(message: pb.WatchStateResponse, now_s: float) -> BridgeReport:
         number = message.status.state
         raise LinkLostError(f"it reports the unknown state number {number}; its version does not match")
     copies = {
-        each.recording_id: CopyReport(each.recording_id, _copy(each.copy))
+        each.recording_id: CopyReport(each.recording_id, _copy(each.copy), _since_s(each, now_s))
         for each in message.copies[:MOST_COPIES]
         if is_id(each.recording_id) and each.copy.state in COPY_STATES
     }
@@ -173,6 +173,12 @@ def _copy(message: Any) -> RecordingCopy:
         printable(message.reason, LONGEST_TEXT),
         message.bytes_done,
     )
+
+
+def _since_s(message: pb.CopyReport, now_s: float) -> float | None:
+    if not message.HasField("state_age_ms"):
+        return None
+    return now_s - min(message.state_age_ms, _LONGEST_MS) / 1000
 
 
 def _request(message: pb.HubRequest, now_s: float) -> HubRequest:

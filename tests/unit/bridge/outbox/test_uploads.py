@@ -23,6 +23,7 @@ UPLOAD = Upload(
     bytes_done=3,
     failures=2,
     due_s=9.0,
+    since_s=8.0,
 )
 
 
@@ -32,7 +33,7 @@ async def test_rows_outlive_the_program(tmp_path: Path) -> None:
         await StoredUploads(kept).put_upload(replace(UPLOAD, recording_id="r2"))
         await StoredUploads(kept).delete_upload("r2")
     async with outbox(tmp_path, 64 << 20) as kept:
-        assert await StoredUploads(kept).uploads() == [replace(UPLOAD, due_s=0.0)]
+        assert await StoredUploads(kept).uploads() == [replace(UPLOAD, due_s=0.0, since_s=None)]
 
 
 @pytest.mark.parametrize("row", ["", "{}", "[]", '{"state": "QUEUED"}', '{"priority": 1}'])

@@ -62,6 +62,15 @@ def test_the_way_of_an_upload() -> None:
     assert upload.failures == 0
 
 
+def test_a_state_has_its_instant_unless_it_was_there_before_the_start() -> None:
+    verified = replace(UPLOAD, state=State.VERIFIED)
+    assert step(verified, Event.RESTART, 5.0).since_s is None
+    upload = step(UPLOAD, Event.ENQUEUE, 5.0)
+    assert upload.since_s == 5.0
+    assert step(upload, Event.ENQUEUE, 6.0).since_s == 5.0
+    assert step(upload, Event.BEGIN, 7.0).since_s == 7.0
+
+
 def test_failures_of_its_own_are_counted_and_pause_it_longer_each_time() -> None:
     upload = replace(UPLOAD, state=State.UPLOADING)
     for count, due_s in ((1, 1.0), (2, 2.0), (3, 4.0)):

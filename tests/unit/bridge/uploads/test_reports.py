@@ -134,7 +134,19 @@ async def test_what_becomes_verified_in_a_backlog_is_reported_at_once() -> None:
     ) as running:
         uploads = QueuedUploads(running.uploads)
         await running.uploads.cancel(NAMES[200])
-        assert NAMES[200] in {each.recording_id for each in uploads.copies()}
+        copies = {each.recording_id: each for each in uploads.copies()}
+        assert copies[NAMES[200]].HasField("state_age_ms")
+
+
+async def test_a_copy_that_the_start_has_found_is_of_no_age() -> None:
+    robot = Robot()
+    hub: Any = None
+    async with running_uploads(
+        robot, hub, "127.0.0.1:9", (), rows_of(State.VERIFIED), only_while_charging=True
+    ) as running:
+        copies = QueuedUploads(running.uploads).copies()
+        assert len(copies) == MOST_COPIES
+        assert not any(each.HasField("state_age_ms") for each in copies)
 
 
 async def test_a_recording_that_the_list_lacks_is_not_reported_for_ever() -> None:

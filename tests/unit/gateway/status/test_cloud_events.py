@@ -1,8 +1,11 @@
 """Which events follow from the bridge's reports."""
 
+from dataclasses import replace
 from typing import Any
 
-from gateway.status.cloud import CloudState, CloudView, RecordingCopyState
+import pytest
+
+from gateway.status.cloud import CloudState, CloudView, CopyReport, RecordingCopyState
 from gateway.status.cloud_events import BURST, REMEMBERED, SETTLED_S, CloudEvents
 from gateway.status.event import CloudChanged, Event, RecordingCopyChanged
 from gateway.status.fault import Severity
@@ -36,7 +39,12 @@ class Ground:
             self.now_s += 0.2
         return found
 
-    def copies(self, *copies: Any) -> list[tuple[str, State, Severity]]:
+    def copies(self, *copies: CopyReport) -> list[tuple[str, State, Severity]]:
+        """The copies that are events, of a report in which each has come to its state just now."""
+        return self.reported(*(replace(each, since_s=self.now_s) for each in copies))
+
+    def reported(self, *copies: CopyReport) -> list[tuple[str, State, Severity]]:
+        """The copies that are events, of a report."""
         found = []
         for each in self.look(view(connected(), self.now_s, copies=copies)):
             assert isinstance(each.detail, RecordingCopyChanged)
@@ -96,8 +104,8 @@ def test_the_label_is_the_recorders() -> None:
     it = Ground()
     it.copies()
     recorder = recorder_view(idle(), NOW_S, ended=(ended("b", label="lap"),))
-    seen = view(connected(), NOW_S, copies=(copy_of("b", State.VERIFIED),))
-    (event,) = it.look(seen, recorder)
+    copied = replace(copy_of("b", State.VERIFIED), since_s=NOW_S)
+    (event,) = it.look(view(connected(), NOW_S, copies=(copied,)), recorder)
     assert isinstance(event.detail, RecordingCopyChanged)
     assert event.detail.label == "lap"
     assert "lap (b)" in event.message
@@ -115,6 +123,20 @@ def test_a_bridge_that_makes_copies_up_floods_nothing() -> None:
     assert len(it.copies(*more)) == 10
     it.now_s += 10
     assert len(it.copies(*more)) == 10, "none is lost"
+
+
+@pytest.mark.parametrize("state", [State.VERIFIED, State.FAILED])
+@pytest.mark.parametrize("since_s", [NOW_S - 60.0, None], ids=["before the gateway", "before the bridge"])
+def test_old_copies_that_the_first_report_had_no_room_for_are_no_news(
+    state: State, since_s: float | None
+) -> None:
+    it = Ground()
+    old = [replace(copy_of(str(number), state), since_s=since_s) for number in range(2 * BURST)]
+    assert it.reported(*old[:BURST]) == []
+    it.now_s += 1
+    assert it.reported(*old[BURST:]) == []
+    new = replace(copy_of("new", state), since_s=it.now_s - 0.5)
+    assert [name for name, *_ in it.reported(new, *old[1:BURST])] == ["new"]
 
 
 def test_while_it_does_not_answer_nothing_is_concluded_of_copies() -> None:

@@ -160,8 +160,11 @@ class CopyReport(_message.Message):
 
     RECORDING_ID_FIELD_NUMBER: _builtins.int
     COPY_FIELD_NUMBER: _builtins.int
+    STATE_AGE_MS_FIELD_NUMBER: _builtins.int
     recording_id: _builtins.str
     """Which."""
+    state_age_ms: _builtins.int
+    """For how long it has been in this state, in ms. Unset where it was so when the bridge started."""
     @_builtins.property
     def copy(self) -> _recording_pb2.RecordingCopy:
         """Where it stands."""
@@ -171,12 +174,15 @@ class CopyReport(_message.Message):
         *,
         recording_id: _builtins.str = ...,
         copy: _recording_pb2.RecordingCopy | None = ...,
+        state_age_ms: _builtins.int | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["copy", b"copy"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_state_age_ms", b"_state_age_ms", "copy", b"copy", "state_age_ms", b"state_age_ms"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["copy", b"copy", "recording_id", b"recording_id"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_state_age_ms", b"_state_age_ms", "copy", b"copy", "recording_id", b"recording_id", "state_age_ms", b"state_age_ms"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    def WhichOneof(self, oneof_group: _Never) -> None: ...
+    _WhichOneofReturnType__state_age_ms: _TypeAlias = _typing.Literal["state_age_ms"]  # noqa: Y015
+    _WhichOneofArgType__state_age_ms: _TypeAlias = _typing.Literal["_state_age_ms", b"_state_age_ms"]  # noqa: Y015
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__state_age_ms) -> _WhichOneofReturnType__state_age_ms | None: ...
 
 Global___CopyReport: _TypeAlias = CopyReport  # noqa: Y015
 

@@ -53,7 +53,7 @@ def test_a_report_arrives_whole() -> None:
     made = message()
     made.status.robot, made.status.fleet, made.status.events_sent = "lab-1", "lab", 7
     made.copies.add(recording_id="a").copy.state = recording_pb2.RECORDING_COPY_STATE_FAILED
-    made.copies.add(recording_id="b")
+    made.copies.add(recording_id="b", state_age_ms=1500)
     upload = made.requests.add(request_id="u", issued_by="anna", remaining_ms=5000)
     upload.upload.recording_id = "a"
     snapshot = made.requests.add(request_id="s", remaining_ms=1)
@@ -63,9 +63,9 @@ def test_a_report_arrives_whole() -> None:
     report = wire.report_from(made, NOW_S)
     assert (report.status.robot, report.status.events_sent) == ("lab-1", 7)
     assert (report.status.last_sent_age_ms, report.status.uploading) == (None, None)
-    assert [(each.recording_id, each.copy.state) for each in report.copies] == [
-        ("a", RecordingCopyState.FAILED),
-        ("b", RecordingCopyState.UNSPECIFIED),
+    assert [(each.recording_id, each.copy.state, each.since_s) for each in report.copies] == [
+        ("a", RecordingCopyState.FAILED, None),
+        ("b", RecordingCopyState.UNSPECIFIED, NOW_S - 1.5),
     ]
     assert report.not_taken == NotTaken(1, 2, 3, 4)
     first, second = report.requests
