@@ -160,9 +160,9 @@ class HubRequests:
         raise DefectError(f"no code for the action {request.action}")
 
     async def _upload(self, request: HubRequest, message: UploadRecordingRequest, left_s: float) -> Answer:
-        recording_id = message.recording_id
-        copy = await self._uploads.queue(message.request_id, recording_id, _who(request), left_s)
-        return Answer(Outcome.DONE, f"{recording_id}: {copy.state.value}", recording_id)
+        queued = await self._uploads.queue(message.request_id, message.recording_id, _who(request), left_s)
+        said = f"{queued.recording_id}: {queued.copy.state.value}"
+        return Answer(Outcome.DONE, said, queued.recording_id)
 
     async def _snapshot(self, request: HubRequest, message: TriggerSnapshotRequest, left_s: float) -> Answer:
         if self._recorder is None:

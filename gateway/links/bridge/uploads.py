@@ -29,16 +29,16 @@ class Uploads:
         self._calls = calls
         self._copies = copies
         self._clock = clock
-        self._answers: OrderedDict[tuple[str, str], tuple[RecordingCopy, float]] = OrderedDict()
+        self._answers: OrderedDict[tuple[str, str], tuple[CopyReport, float]] = OrderedDict()
         """By method and request ID, with the instant of the first one."""
 
     async def queue(
         self, request_id: str, recording_id: str, caller: str, remaining_s: float | None
-    ) -> RecordingCopy:
-        """Queues a recording to be copied; returns where its copy stands.
+    ) -> CopyReport:
+        """Queues a recording to be copied; returns which, and where its copy stands.
 
         Args:
-            request_id: repeated, it gets the first answer.
+            request_id: repeated, it gets the first answer, which is of the recording of then.
             recording_id: which recording.
             caller: for people.
             remaining_s: until the caller's deadline; None without one.
@@ -47,23 +47,23 @@ class Uploads:
             DomainError: the bridge refuses, or does not answer.
         """
 
-        async def call() -> RecordingCopy:
+        async def call() -> CopyReport:
             copy = await self._calls.upload(recording_id, caller, remaining_s)
             self._note(recording_id, copy)
-            return copy
+            return CopyReport(recording_id, copy)
 
         return await self._once(("queue", request_id), call)
 
     async def cancel(
         self, request_id: str, recording_id: str, caller: str, remaining_s: float | None
-    ) -> RecordingCopy:
-        """Takes a recording from the queue, as `queue` puts it there; returns where its copy stood."""
+    ) -> CopyReport:
+        """Takes a recording from the queue; returns which, and where its copy stood. As `queue`."""
 
-        async def call() -> RecordingCopy:
+        async def call() -> CopyReport:
             copy = await self._calls.cancel(recording_id, caller, remaining_s)
             if copy.state is not RecordingCopyState.VERIFIED:
                 self._note(recording_id, RecordingCopy(RecordingCopyState.UNSPECIFIED))
-            return copy
+            return CopyReport(recording_id, copy)
 
         return await self._once(("cancel", request_id), call)
 
@@ -71,16 +71,14 @@ class Uploads:
         if self._copies:
             self._copies.note(CopyReport(recording_id, copy))
 
-    async def _once(
-        self, key: tuple[str, str], call: Callable[[], Awaitable[RecordingCopy]]
-    ) -> RecordingCopy:
+    async def _once(self, key: tuple[str, str], call: Callable[[], Awaitable[CopyReport]]) -> CopyReport:
         now_s = self._clock()
         while self._answers and now_s - next(iter(self._answers.values()))[1] > ANSWERED_S:
             self._answers.popitem(last=False)
         if key in self._answers:
             return self._answers[key][0]
-        copy = await call()
-        self._answers[key] = copy, now_s
+        answer = await call()
+        self._answers[key] = answer, now_s
         if len(self._answers) > MOST_ANSWERS:
             self._answers.popitem(last=False)
-        return copy
+        return answer

@@ -107,20 +107,20 @@ class RecordingService:
         self, request: UploadRecordingRequest, call: CallContext
     ) -> UploadRecordingResponse:
         """Returns when the recording is in the bridge's queue."""
-        copy = await self._fleet().queue(
+        queued = await self._fleet().queue(
             request.request_id, request.recording_id, _caller(call), call.remaining_s()
         )
-        message = f"{request.recording_id} {_where(copy)}"
-        return UploadRecordingResponse(message=message, copy=recording_copy(copy))
+        message = f"{queued.recording_id} {_where(queued.copy)}"
+        return UploadRecordingResponse(message=message, copy=recording_copy(queued.copy))
 
     async def cancel_upload(self, request: CancelUploadRequest, call: CallContext) -> CancelUploadResponse:
         """Returns when the recording is no longer in the bridge's queue."""
-        copy = await self._fleet().cancel(
+        ended = await self._fleet().cancel(
             request.request_id, request.recording_id, _caller(call), call.remaining_s()
         )
-        kept = copy.state is RecordingCopyState.VERIFIED
-        what = _where(copy) if kept else "is not copied to the fleet's store any more"
-        return CancelUploadResponse(message=f"{request.recording_id} {what}")
+        kept = ended.copy.state is RecordingCopyState.VERIFIED
+        what = _where(ended.copy) if kept else "is not copied to the fleet's store any more"
+        return CancelUploadResponse(message=f"{ended.recording_id} {what}")
 
     def _rank(self, call: CallContext) -> Rank:
         if bridge_run.is_of(self._bridge_run(), call.rpc.invocation_metadata() or ()):

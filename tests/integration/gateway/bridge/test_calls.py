@@ -75,6 +75,17 @@ async def test_a_repeated_request_changes_nothing(tmp_path: Path) -> None:
         assert [method for method, _, _ in robot.bridge.calls] == ["upload", "cancel"]
 
 
+async def test_a_repeated_request_of_another_recording_is_answered_of_the_first(tmp_path: Path) -> None:
+    async with fleet_robot(tmp_path) as robot:
+        robot.recorder.add({"a": b"1"}, id="one")
+        robot.recorder.add({"a": b"2"}, id="two")
+        first = await robot.stub.UploadRecording(upload())
+        assert await robot.stub.UploadRecording(upload(recording_id="two")) == first
+        ended = await robot.stub.CancelUpload(cancel())
+        assert await robot.stub.CancelUpload(cancel(recording_id="two")) == ended
+        assert [recording_id for _, recording_id, _ in robot.bridge.calls] == ["one", "one"]
+
+
 async def test_what_the_bridge_refuses_is_refused_with_its_reason(tmp_path: Path) -> None:
     async with fleet_robot(tmp_path) as robot:
         stub, double = robot.stub, robot.bridge

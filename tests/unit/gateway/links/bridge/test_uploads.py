@@ -44,10 +44,10 @@ class Ground:
         self.uploads = Uploads(bridge, bridge, lambda: self.now_s)
 
     async def queue(self, request_id: str, recording_id: str = "a") -> RecordingCopy:
-        return await self.uploads.queue(request_id, recording_id, "anna", None)
+        return (await self.uploads.queue(request_id, recording_id, "anna", None)).copy
 
     async def cancel(self, request_id: str) -> RecordingCopy:
-        return await self.uploads.cancel(request_id, "a", "anna", None)
+        return (await self.uploads.cancel(request_id, "a", "anna", None)).copy
 
 
 async def test_a_repeated_request_gets_the_first_answer_for_ten_minutes() -> None:
