@@ -1,13 +1,23 @@
 """Promises are judged at their number, on a machine that is free enough to judge."""
 
 import asyncio
+import ctypes
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 
 import pytest
 
 from tests.support import promise
-from tests.support.promise import ATTEMPTS, LOADED_FROM, STOLEN_FROM_S, keeps, keeps_async
+from tests.support.promise import (
+    ATTEMPTS,
+    LOADED_FROM,
+    STALLED_FROM_S,
+    STOLEN_FROM_S,
+    keeps,
+    keeps_async,
+)
+from tests.support.stalls import Stalls
 
 FREE, LOADED = LOADED_FROM - 0.01, LOADED_FROM + 0.01
 
@@ -20,6 +30,18 @@ class Attempts:
     """The share of the time in which a program waits for a processor."""
     stolen_s: list[float] = field(default_factory=list)
     """What the host takes; nothing where the list has ended."""
+    stalled_s: list[float] = field(default_factory=list)
+    """For how long this process stands still; not at all where the list has ended."""
+
+
+@dataclass
+class PlayedStalls(AbstractContextManager[None]):
+    """Stalls that nothing on this machine has made."""
+
+    longest_s: float
+
+    def __exit__(self, *_: object) -> None:
+        pass
 
 
 @pytest.fixture
@@ -36,6 +58,9 @@ def attempts(monkeypatch: pytest.MonkeyPatch) -> Attempts:
 
     ticks = clock()
     monkeypatch.setattr(promise, "_machine", lambda: next(ticks))
+    monkeypatch.setattr(
+        promise, "Stalls", lambda: PlayedStalls(made.stalled_s.pop(0) if made.stalled_s else 0.0)
+    )
     return made
 
 
@@ -69,6 +94,27 @@ def test_what_the_host_takes_is_no_fault_of_the_product(
         return
     with pytest.warns(UserWarning, match="not judged: .* the host took 0.02 s"):
         assert keeps(2.0, "s", lambda: next(figures)) == 1.5
+
+
+@pytest.mark.parametrize(("stalled_s", "judged"), [(0.02, True), (STALLED_FROM_S, False)])
+def test_what_a_stall_of_the_machine_has_made_late_is_measured_again(
+    attempts: Attempts, stalled_s: float, judged: bool
+) -> None:
+    attempts.loads += [FREE, FREE]
+    attempts.stalled_s += [stalled_s]
+    figures = iter([9.0, 1.5])
+    if judged:
+        with pytest.raises(pytest.fail.Exception, match="promised 2"):
+            keeps(2.0, "s", lambda: next(figures))
+        return
+    with pytest.warns(UserWarning, match="not judged: .* stood still for 0.030 s"):
+        assert keeps(2.0, "s", lambda: next(figures)) == 1.5
+
+
+def test_a_process_that_stands_still_is_noticed() -> None:
+    with Stalls() as stalls:
+        ctypes.PyDLL(None).usleep(150_000)  # of a library for Python's own functions: no other thread runs
+    assert stalls.longest_s > 0.1
 
 
 def test_the_machine_that_this_runs_on_is_read() -> None:
