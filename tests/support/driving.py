@@ -24,6 +24,7 @@ from omniseer.drive.v1 import drive_pb2 as pb
 from tests.support.drive_peer import Instants
 from tests.support.explained import explained_by
 from tests.support.ros import SimulatedRobot, simulated_robot
+from tests.support.undisturbed import WORKER_LOST, DisturbedError, same_worker
 from tests.support.waiting import wait_until
 
 _ROOT: Final = Path(__file__).parents[2]
@@ -89,11 +90,15 @@ class Observer:
 
     Args:
         path: of its socket.
+
+    Attributes:
+        worker: whose states are wanted; None: those of any.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._link: socket.socket | None = None
+        self.worker: psutil.Process | None = None
 
     def close(self) -> None:
         """Disconnects."""
@@ -102,7 +107,13 @@ class Observer:
             self._link = None
 
     def state(self) -> pb.ActualState | None:
-        """Returns the newest state; None while the program can't be reached."""
+        """Returns the newest state; None while the program can't be reached.
+
+        Raises:
+            DisturbedError: the worker whose states are wanted was lost.
+        """
+        if self.worker and not self.worker.is_running():
+            raise DisturbedError(WORKER_LOST)
         try:
             if self._link is None:
                 self._link = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -240,6 +251,12 @@ class Driving:
         """Waits for one of these phases; returns the state."""
         return self.observer.phase_is(*phases)
 
+    def inhibited(self) -> pb.ActualState:
+        """Waits until a reason ends the motion; returns the state. A lost worker leaves a stop instead."""
+        state = self.phase_is("INHIBITED", "STOPPED")
+        assert state.phase == pb.PHASE_INHIBITED, f"it is {state}"
+        return state
+
     def ready(self) -> Peer:
         """Connects a new gateway's end and resets what is latched; nobody drives when this returns."""
         if self.guard is None or self.guard.poll() is not None:
@@ -304,7 +321,46 @@ class Driving:
     def worker(self) -> psutil.Process:
         """The worker's process."""
         assert self.guard
-        return psutil.Process(self.guard.pid).children()[0]
+        (worker,) = wait_until(psutil.Process(self.guard.pid).children, "a worker")
+        return worker
+
+    @contextmanager
+    def moving(self, *, loses_worker: bool = False) -> Iterator[None]:
+        """A part of an attempt that begins in motion, after `drive`; see tests.support.undisturbed.
+
+        Args:
+            loses_worker: the block itself ends the worker.
+
+        Raises:
+            DisturbedError: the robot is at rest already, or the worker was lost without need.
+        """
+        worker = self.worker
+        if not self.witness.moves():
+            raise DisturbedError("the robot was at rest already")
+        if loses_worker:
+            yield
+            return
+        with self._by(worker):
+            yield
+
+    @contextmanager
+    def same_worker(self) -> Iterator[None]:
+        """A part of an attempt, after `ready`; see tests.support.undisturbed.
+
+        Raises:
+            DisturbedError: the worker was lost.
+        """
+        with self._by(self.worker):
+            yield
+
+    @contextmanager
+    def _by(self, worker: psutil.Process) -> Iterator[None]:
+        self.observer.worker = worker
+        try:
+            with same_worker(worker):
+                yield
+        finally:
+            self.observer.worker = None
 
     def settled(self) -> None:
         """Waits until nothing has reached the base as motion for half a second."""

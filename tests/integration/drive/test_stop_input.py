@@ -14,6 +14,7 @@ from common.ros_node import message_class, ros_node
 from omniseer.drive.v1 import drive_pb2 as pb
 from tests.support.driving import Driving, driving
 from tests.support.helper import helper
+from tests.support.undisturbed import undisturbed
 from tests.support.waiting import wait_until
 
 pytestmark = [pytest.mark.ros, pytest.mark.timed]
@@ -29,42 +30,50 @@ def test_it_is_pressed_until_a_live_publisher_says_otherwise(
     qos: Any,
 ) -> None:
     boolean = message_class("std_msgs/msg/Bool")
-    with driving(tmp_path, stop_topics=["/stop_button"]) as robot:
+
+    def attempt() -> None:
         peer = robot.ready()
-        peer.send(lease="anna", held=False)
-        robot.phase_is("INHIBITED")
-        wait_until(lambda: list(robot.state().inhibits) == [pb.INHIBIT_ROBOT_STOP], "the one reason")
-        with ros_node("button") as button:
-            publisher = button.create_publisher(boolean, "/stop_button", qos)
-            if qos is VOLATILE:
-                wait_until(lambda: publisher.get_subscription_count() >= 2, "its subscribers")
-            publisher.publish(boolean(data=False))
-            robot.phase_is("ARMED")
-            peer.send(held=True)
-            robot.phase_is("DRIVING")
-            publisher.publish(boolean(data=True))
-            assert pb.INHIBIT_ROBOT_STOP in robot.phase_is("INHIBITED").inhibits
-            peer.send(held=False)
-            publisher.publish(boolean(data=False))
-            robot.phase_is("ARMED")
-        robot.phase_is("INHIBITED")
-        wait_until(lambda: list(robot.state().inhibits) == [pb.INHIBIT_ROBOT_STOP], "the button has gone")
+        with robot.same_worker():
+            peer.send(lease="anna", held=False)
+            robot.phase_is("INHIBITED")
+            wait_until(lambda: list(robot.state().inhibits) == [pb.INHIBIT_ROBOT_STOP], "the one reason")
+            with ros_node("button") as button:
+                publisher = button.create_publisher(boolean, "/stop_button", qos)
+                if qos is VOLATILE:
+                    wait_until(lambda: publisher.get_subscription_count() >= 2, "its subscribers")
+                publisher.publish(boolean(data=False))
+                robot.phase_is("ARMED")
+                peer.send(held=True)
+                robot.phase_is("DRIVING")
+                publisher.publish(boolean(data=True))
+                assert pb.INHIBIT_ROBOT_STOP in robot.phase_is("INHIBITED").inhibits
+                peer.send(held=False)
+                publisher.publish(boolean(data=False))
+                robot.phase_is("ARMED")
+            robot.phase_is("INHIBITED")
+            wait_until(lambda: list(robot.state().inhibits) == [pb.INHIBIT_ROBOT_STOP], "the button has gone")
+
+    with driving(tmp_path, stop_topics=["/stop_button"]) as robot:
+        undisturbed(attempt)
 
 
 @contextmanager
 def leased(robot: Driving) -> Iterator[None]:
-    """A driver who does not hold, so that the reasons to inhibit are reported."""
-    robot.ready().send(lease="anna", held=False)
-    robot.phase_is("INHIBITED", "ARMED")
-    yield
+    """A driver who does not hold, so that the reasons to inhibit are reported; see `Driving.same_worker`."""
+    peer = robot.ready()
+    with robot.same_worker():
+        peer.send(lease="anna", held=False)
+        robot.phase_is("INHIBITED", "ARMED")
+        yield
 
 
 def test_what_one_publisher_has_pressed_no_other_releases(tmp_path: Path, ros_domain: int) -> None:  # noqa: ARG001
     boolean = message_class("std_msgs/msg/Bool")
-    with driving(tmp_path, stop_topics=["/stop_button"]) as robot, ros_node("button") as button:
-        pressing = button.create_publisher(boolean, "/stop_button", LATCHED)
-        pressing.publish(boolean(data=False))
-        with leased(robot), ros_node("other") as other:
+
+    def attempt() -> None:
+        with leased(robot), ros_node("button") as button, ros_node("other") as other:
+            pressing = button.create_publisher(boolean, "/stop_button", LATCHED)
+            pressing.publish(boolean(data=False))
             robot.phase_is("ARMED")
             releasing = other.create_publisher(boolean, "/stop_button", LATCHED)
             wait_until(lambda: "2 publishers" in " ".join(robot.state().problems), "both are seen")
@@ -78,18 +87,27 @@ def test_what_one_publisher_has_pressed_no_other_releases(tmp_path: Path, ros_do
             robot.phase_is("ARMED")
             assert not robot.state().problems
 
+    with driving(tmp_path, stop_topics=["/stop_button"]) as robot:
+        undisturbed(attempt)
+
 
 def test_a_press_that_is_released_at_once_counts(tmp_path: Path, ros_domain: int) -> None:  # noqa: ARG001
     boolean = message_class("std_msgs/msg/Bool")
     with driving(tmp_path, stop_topics=["/stop_button"]) as robot, ros_node("button") as button:
-        publisher = button.create_publisher(boolean, "/stop_button", QoSProfile(depth=10))
-        wait_until(lambda: publisher.get_subscription_count() >= 2, "its subscribers")
+        # Latched, for a worker that takes the place of a lost one.
+        qos = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        publisher = button.create_publisher(boolean, "/stop_button", qos)
         publisher.publish(boolean(data=False))
-        robot.drive()
-        for pressed in (True, False):
-            publisher.publish(boolean(data=pressed))
-        robot.phase_is("INHIBITED")
-        robot.settled()
+
+        def attempt() -> None:
+            robot.drive()
+            with robot.moving():
+                for pressed in (True, False):
+                    publisher.publish(boolean(data=pressed))
+                robot.inhibited()
+            robot.settled()
+
+        undisturbed(attempt)
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
@@ -98,13 +116,16 @@ def test_a_publisher_that_is_silent_counts_as_pressed_where_that_is_configured(
     ros_domain: int,  # noqa: ARG001  # for its effect
     number: signal.Signals,
 ) -> None:
-    with (
-        driving(tmp_path, stop_topics=["/stop_button"], stop_timeout_ms=500) as robot,
-        helper("tests.support.stop_button", "/stop_button") as button,
-    ):
-        robot.drive()
-        button.send_signal(number)
-        began_ns = time.monotonic_ns()
-        assert pb.INHIBIT_ROBOT_STOP in robot.phase_is("INHIBITED").inhibits
-        robot.settled()
-        assert robot.witness.zero_after_ms(began_ns) < 1000
+
+    def attempt() -> None:
+        with helper("tests.support.stop_button", "/stop_button") as button:
+            robot.drive()
+            with robot.moving():
+                button.send_signal(number)
+                began_ns = time.monotonic_ns()
+                assert pb.INHIBIT_ROBOT_STOP in robot.inhibited().inhibits
+                robot.settled()
+                assert robot.witness.zero_after_ms(began_ns) < 1000
+
+    with driving(tmp_path, stop_topics=["/stop_button"], stop_timeout_ms=500) as robot:
+        undisturbed(attempt)

@@ -9,18 +9,24 @@ import pytest
 
 from tests.support.driving import Driving
 from tests.support.promise import keeps
+from tests.support.undisturbed import undisturbed
 from tests.support.waiting import wait_until
 
 pytestmark = [pytest.mark.ros, pytest.mark.timed]
 
 
-def zero_after(robot: Driving, event: Callable[[], int]) -> float:
+def zero_after(robot: Driving, event: Callable[[], int], *, loses_worker: bool = False) -> float:
     """Drives, has something happen, and returns how long after it (`event` says when) zero arrived, in ms."""
-    robot.drive()
-    since_ns = event()
-    wait_until(lambda: not robot.witness.moves(), "zero")
-    robot.settled()
-    return robot.witness.zero_after_ms(since_ns)
+
+    def attempt() -> float:
+        robot.drive()
+        with robot.moving(loses_worker=loses_worker):
+            since_ns = event()
+            wait_until(lambda: not robot.witness.moves(), "zero")
+            robot.settled()
+        return robot.witness.zero_after_ms(since_ns)
+
+    return undisturbed(attempt)
 
 
 def now_ns(_: object) -> int:
@@ -61,7 +67,7 @@ def test_the_gateway_is_silent(robot: Driving) -> None:
     def fall_silent() -> int:
         assert robot.peer
         robot.peer.send(silent=True)
-        robot.phase_is("INHIBITED")
+        robot.inhibited()
         return robot.peer.instants.command_ns
 
     keeps(280, "gateway silent, ms after the last command", lambda: zero_after(robot, fall_silent))
@@ -75,7 +81,7 @@ def test_the_worker_is_lost(robot: Driving, number: signal.Signals) -> None:
         os.kill(pid, number)
         return began_ns
 
-    keeps(150, f"worker {number.name}, ms", lambda: zero_after(robot, lose))
+    keeps(150, f"worker {number.name}, ms", lambda: zero_after(robot, lose, loses_worker=True))
     assert wait_until(lambda: robot.state().stop.by, "a latched stop", 30) == "robot-drive"
 
 
@@ -93,7 +99,7 @@ def test_the_picture_grows_old(robot: Driving) -> None:
     def freeze_picture() -> int:
         assert robot.peer
         robot.peer.send(picture_frozen=True)
-        robot.phase_is("INHIBITED")
+        robot.inhibited()
         return robot.peer.instants.picture_ns
 
     keeps(650, "picture frozen, ms after its capture", lambda: zero_after(robot, freeze_picture))
@@ -103,7 +109,7 @@ def test_only_the_downlink_is_dead(robot: Driving) -> None:
     def freeze_echo() -> int:
         assert robot.peer
         robot.peer.send(echo_frozen=True)
-        robot.phase_is("INHIBITED")
+        robot.inhibited()
         return robot.peer.instants.echo_ns
 
     keeps(450, "downlink dead, ms after the newest echo", lambda: zero_after(robot, freeze_echo))
@@ -117,7 +123,7 @@ def test_the_guard_is_killed(robot: Driving) -> None:
         robot.guard.wait()
         return began_ns
 
-    keeps(150, "guard killed, ms", lambda: zero_after(robot, kill))
+    keeps(150, "guard killed, ms", lambda: zero_after(robot, kill, loses_worker=True))
     wait_until(lambda: robot.observer.state() is None, "the worker has ended")
     robot.start()
     assert robot.state().stop.by == "robot-drive", "the next start finds a stop"
@@ -132,7 +138,7 @@ def test_the_guard_is_frozen(robot: Driving) -> None:
 
     def judged() -> float:
         try:
-            return zero_after(robot, freeze)
+            return zero_after(robot, freeze, loses_worker=True)
         finally:
             assert robot.guard
             robot.guard.kill()
@@ -143,12 +149,25 @@ def test_the_guard_is_frozen(robot: Driving) -> None:
 
 def test_both_are_killed_and_only_the_base_stops(robot: Driving) -> None:
     """Nothing of this program is left: the base's own timeout has to do it, as the doctor says."""
-    robot.drive()
-    worker = robot.worker
-    worker.suspend()
-    assert robot.guard
-    robot.guard.kill()
-    worker.kill()
-    robot.guard.wait()
+
+    def attempt() -> None:
+        robot.drive()
+        assert robot.guard
+        with robot.moving():
+            # In this order, so that neither has the time to notice the other's end.
+            robot.guard.send_signal(signal.SIGSTOP)
+            worker = robot.worker
+            try:
+                worker.suspend()
+                robot.settled()
+                assert robot.witness.moves()
+            except BaseException:
+                robot.guard.send_signal(signal.SIGCONT)
+                raise
+        worker.kill()
+        robot.guard.kill()
+        robot.guard.wait()
+
+    undisturbed(attempt)
     robot.settled()
     assert robot.witness.moves(), "no zero: the double's revival after 71.6 minutes is possible"
