@@ -1,12 +1,13 @@
 """A robot to drive: real gateway and drive program, the mux double behind them, and a base that listens."""
 
 import asyncio
+import functools
 import time
-from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager, contextmanager, suppress
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec
 
 from console.client import (
     AsyncGatewayClient,
@@ -14,8 +15,6 @@ from console.client import (
     DrivePhase,
     DriveSession,
     GatewayError,
-    Refused,
-    StopLatch,
     Supervision,
 )
 from drive.config import DriveSettings
@@ -23,16 +22,18 @@ from tests.support.driving import BEHIND_THE_MUX
 from tests.support.eventually import eventually
 from tests.support.gateway_program import GatewayProgram, gateway_program
 from tests.support.heard import Base
+from tests.support.lost_worker import RESET_WITHIN_S, ready_after_a_loss
 from tests.support.ros import simulated_robot
 from tests.support.running_drive import RunningDrive, listening_base, running_drive
+from tests.support.undisturbed import DisturbedError, same_worker, undisturbed_async
 from tests.support.waiting import wait_until
+
+P = ParamSpec("P")
 
 REST_S = 0.3
 """Longer than any message takes that is on its way."""
 _HOLD_EVERY_S = 0.02
-LOST_BY = "robot-drive"
-"""Who stops a robot whose worker was lost."""
-_IN_MOTION_WITHIN_S = 30.0
+_IN_MOTION_WITHIN_S = 45.0
 _ATTEMPT = 100
 """Holds without motion, each 10 ms or more, after which the driver releases and holds anew."""
 BY_EYE = DriveOptions(supervision=Supervision.LINE_OF_SIGHT, input_device="test")
@@ -105,6 +106,43 @@ def driven_robot(
         yield robot
 
 
+@contextmanager
+def moving(base: Base, drive: RunningDrive) -> Iterator[None]:
+    """A part of an attempt that begins in motion; see tests.support.undisturbed.
+
+    Args:
+        base: that moves.
+        drive: by which program.
+
+    Raises:
+        DisturbedError: the base is at rest already, or the program's worker was lost.
+    """
+    worker = drive.worker
+    if not base.moves:
+        raise DisturbedError("the base was at rest already")
+    with same_worker(worker):
+        yield
+
+
+def anew_after_a_loss(test: Callable[P, Awaitable[None]]) -> Callable[P, Awaitable[None]]:
+    """A test of a robot that is begun anew where the drive program's worker was lost meanwhile."""
+
+    @functools.wraps(test)
+    async def begun_anew(*args: P.args, **fixtures: P.kwargs) -> None:
+        robot = fixtures["robot"]
+        assert isinstance(robot, DrivenRobot)
+
+        async def attempt() -> None:
+            async with available(robot):
+                pass
+            with same_worker(robot.drive.worker):
+                await test(*args, **fixtures)
+
+        await undisturbed_async(attempt)
+
+    return begun_anew
+
+
 async def in_motion(client: AsyncGatewayClient, session: DriveSession, base: Base, speed_mps: float) -> None:
     """Holds anew until base and driver have motion; a busy machine may take several attempts.
 
@@ -123,38 +161,12 @@ async def in_motion(client: AsyncGatewayClient, session: DriveSession, base: Bas
         nonlocal attempts
         if attempts % _ATTEMPT == 0:
             session.release()
-            await _reset_after_a_loss(client)
-            try:
-                await session.ready(within_s=15)
-            except Refused:
-                if not await _stop_by_a_loss(client):
-                    raise
-                return False  # Another worker was lost meanwhile.
+            await ready_after_a_loss(client, session)
         attempts += 1
         session.hold(speed_mps)
         return base.moves and session.state is not None and session.state.phase is DrivePhase.DRIVING
 
     await eventually(moves, bool, "the base moves, and the driver knows", _IN_MOTION_WITHIN_S)
-
-
-async def _reset_after_a_loss(client: AsyncGatewayClient) -> None:
-    """Resets a stop that the drive program has made itself; one of a caller stays."""
-
-    async def is_reset() -> bool:
-        stop = await _stop_by_a_loss(client)
-        if stop is None:
-            return True
-        with suppress(GatewayError):  # It is not known yet what else commands the robot.
-            await client.reset_stop(stop.stop_id)
-        return False
-
-    await eventually(is_reset, bool, "the stop is reset that a lost worker has left", _IN_MOTION_WITHIN_S)
-
-
-async def _stop_by_a_loss(client: AsyncGatewayClient) -> StopLatch | None:
-    """Returns the stop that the drive program has made itself."""
-    stop = (await client.status()).teleop.stop
-    return stop if stop is not None and stop.by == LOST_BY else None
 
 
 @asynccontextmanager
@@ -217,11 +229,22 @@ async def stop_by(
         try:
             await operator.reset_stop(stopped.stop.stop_id)
         except GatewayError:  # It is not known yet what else commands the robot, or its worker is replaced.
+            return await other_is_reset()
+        return True
+
+    async def other_is_reset() -> bool:
+        """Of a worker that was lost, the next one may have a stop of its own."""
+        try:
+            stop = (await operator.status()).teleop.stop
+            if stop is None or stop.stop_id == stopped.stop.stop_id:
+                return False
+            await operator.reset_stop(stop.stop_id)
+        except GatewayError:
             return False
         return True
 
     await eventually(has_zero, bool, "the base has zero")
-    await eventually(is_reset, bool, "the stop is reset")
+    await eventually(is_reset, bool, "the stop is reset", RESET_WITHIN_S)
     return base.heard[heard].at_s - began_s, answered_s
 
 

@@ -10,6 +10,7 @@ from subprocess import Popen
 from typing import Final
 
 from console.client import AsyncGatewayClient, DriveOptions, DrivePhase, Supervision
+from tests.support.lost_worker import ready_after_a_loss
 from tests.support.module_program import module_program
 
 SPEED_MPS: Final = 0.1
@@ -33,7 +34,7 @@ async def drive(target: str) -> None:
             session.check()
             if not said and holds % _ATTEMPT == 0:
                 session.release()
-                await session.ready(within_s=15)
+                await ready_after_a_loss(client, session)
             session.hold(SPEED_MPS)
             holds += 1
             moves = session.state is not None and session.state.phase is DrivePhase.DRIVING

@@ -12,6 +12,7 @@ from typing import Final, NoReturn, Self
 import pytest
 
 from tests.support.stalls import Stalls
+from tests.support.undisturbed import undisturbed, undisturbed_async
 
 _PRESSURE: Final = Path("/proc/pressure/cpu")
 _PROCESSORS: Final = Path("/proc/stat")
@@ -38,11 +39,15 @@ def keeps(promised: float, what: str, measure: Callable[[], float]) -> float:
     Args:
         promised: the documented number; a figure may reach it.
         what: the figure and its unit, for people.
-        measure: returns the figure; may be called several times.
+        measure: returns the figure; may be called several times, and anew after a DisturbedError.
     """
-    for _ in range(ATTEMPTS):
+
+    def measured() -> tuple[_Attempt, float]:
         with _Attempt(promised, what) as attempt:
-            figure = measure()
+            return attempt, measure()
+
+    for _ in range(ATTEMPTS):
+        attempt, figure = undisturbed(measured)
         if attempt.keeps(figure):
             return figure
     return _never_judged(what)
@@ -50,9 +55,13 @@ def keeps(promised: float, what: str, measure: Callable[[], float]) -> float:
 
 async def keeps_async(promised: float, what: str, measure: Callable[[], Awaitable[float]]) -> float:
     """As `keeps`, for what is measured in an event loop."""
-    for _ in range(ATTEMPTS):
+
+    async def measured() -> tuple[_Attempt, float]:
         with _Attempt(promised, what) as attempt:
-            figure = await measure()
+            return attempt, await measure()
+
+    for _ in range(ATTEMPTS):
+        attempt, figure = await undisturbed_async(measured)
         if attempt.keeps(figure):
             return figure
     return _never_judged(what)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from console.client import AsyncGatewayClient, DrivePhase
+from console.client import AsyncGatewayClient, DrivePhase, DriveSession
 from tests.support.driven_robot import (
     BY_EYE,
     DrivenRobot,
@@ -18,6 +18,7 @@ from tests.support.driven_robot import (
     driven_robot,
     held,
     in_motion,
+    moving,
     network_settings,
     stop_by,
 )
@@ -63,13 +64,15 @@ async def stopped_after_s(robot: DrivenRobot, link: TcpLink, fault: Callable[[],
     async with AsyncGatewayClient(link.target) as client, client.drive(BY_EYE) as session:
         await in_motion(client, session, robot.base, SPEED_MPS)
         async with held(session, SPEED_MPS):
-            began_s = time.monotonic()
-            fault()
-            await asyncio.sleep(QUIET_S)
-            assert not robot.base.moves, "the last message is zero"
-            stopped_s = robot.base.stopped_after_s(began_s)
-            link.impair(delay_s=ONE_WAY_S)
-            return stopped_s
+            try:
+                with moving(robot.base, robot.drive):
+                    began_s = time.monotonic()
+                    fault()
+                    await asyncio.sleep(QUIET_S)
+                    assert not robot.base.moves, "the last message is zero"
+                    return robot.base.stopped_after_s(began_s)
+            finally:
+                link.impair(delay_s=ONE_WAY_S)
 
 
 async def test_a_cut_cable_stops_within_280_ms(robot: DrivenRobot, link: TcpLink) -> None:
@@ -114,19 +117,24 @@ async def test_3_percent_loss_stops_nothing_and_no_old_command_passes(
             client.drive(BY_EYE) as session,
         ):
             await in_motion(client, session, robot.base, SPEED_MPS)
-            began_s, stops = time.monotonic(), 0
-            async with held(session, SPEED_MPS):
-                async for state in session.states():
-                    stops += state.phase is not DrivePhase.DRIVING
-                    if time.monotonic() - began_s > DRIVEN_S or stops:
-                        return stops
-        raise AssertionError
+            with moving(robot.base, robot.drive):
+                ignored = observer.now().counters.ignored
+                stops = await driven(session)
+                assert observer.now().counters.ignored == ignored, "a copy, or an old command, was passed on"
+                return stops
+
+    async def driven(session: DriveSession) -> int:
+        began_s, stops = time.monotonic(), 0
+        async with held(session, SPEED_MPS):
+            async for state in session.states():
+                stops += state.phase is not DrivePhase.DRIVING
+                if time.monotonic() - began_s > DRIVEN_S or stops:
+                    break
+        return stops
 
     observer = Observer(robot.drive.socket)
     try:
-        ignored = observer.now().counters.ignored
         await keeps_async(0, f"stops without need in {DRIVEN_S:g} s", false_stops)
-        assert observer.now().counters.ignored == ignored, "a copy, or a command of old, was passed on"
     finally:
         observer.close()
 
@@ -150,13 +158,14 @@ async def test_blackouts_of_300_ms_end_the_motion_until_a_release(robot: DrivenR
     async def blackout() -> float:
         await in_motion(client, session, robot.base, SPEED_MPS)
         async with held(session, SPEED_MPS):
-            began_s = time.monotonic()
-            link.cut()
-            await asyncio.sleep(BLACKOUT_S)
-            link.impair(delay_s=ONE_WAY_S)
-            await asyncio.sleep(QUIET_S)
-            session.check()
-            return robot.base.stopped_after_s(began_s)
+            with moving(robot.base, robot.drive):
+                began_s = time.monotonic()
+                link.cut()
+                await asyncio.sleep(BLACKOUT_S)
+                link.impair(delay_s=ONE_WAY_S)
+                await asyncio.sleep(QUIET_S)
+                session.check()
+                return robot.base.stopped_after_s(began_s)
 
     async with available(robot), AsyncGatewayClient(link.target) as client, client.drive(BY_EYE) as session:
         for _ in range(BLACKOUTS):

@@ -8,14 +8,14 @@ import os
 import signal
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 
 import pytest
 
 from console.client import AsyncGatewayClient, DrivePhase
 from tests.support.calendar_clock import CalendarClock
-from tests.support.driven_robot import BY_EYE, DrivenRobot, available, driven_robot, held, in_motion
+from tests.support.driven_robot import BY_EYE, DrivenRobot, available, driven_robot, held, in_motion, moving
 from tests.support.driver_program import driver
-from tests.support.eventually import eventually
 from tests.support.promise import keeps_async
 
 pytestmark = [pytest.mark.ros, pytest.mark.timed, pytest.mark.alone]
@@ -59,15 +59,16 @@ async def test_a_step_of_an_hour_does_not_stop_the_robot(robot: DrivenRobot, clo
             await in_motion(client, session, robot.base, SPEED_MPS)
             phases = set()
             async with held(session, SPEED_MPS):
-                for step_s in STEPS_S:
-                    clock.step(step_s)
-                    until_s = time.monotonic() + DRIVEN_S
-                    async for state in session.states():
-                        phases.add(state.phase)
-                        if time.monotonic() > until_s:
-                            break
-                    stamp_s = robot.base.heard[-1].stamp_s
-                    assert stamp_s - time.time() == pytest.approx(step_s, abs=10), "the step is in force"
+                with moving(robot.base, robot.drive):
+                    for step_s in STEPS_S:
+                        clock.step(step_s)
+                        until_s = time.monotonic() + DRIVEN_S
+                        async for state in session.states():
+                            phases.add(state.phase)
+                            if time.monotonic() > until_s:
+                                break
+                        stamp_s = robot.base.heard[-1].stamp_s
+                        assert stamp_s - time.time() == pytest.approx(step_s, abs=10), "the step is in force"
         return len(phases - {DrivePhase.DRIVING})
 
     await keeps_async(0, "phases beside driving while the calendar clock was stepped", stops_without_need)
@@ -85,12 +86,13 @@ async def test_a_release_after_a_step_stops_within_60_ms(
             client.drive(BY_EYE) as session,
         ):
             await in_motion(client, session, robot.base, SPEED_MPS)
-            async with held(session, SPEED_MPS):
-                clock.step(step_s)
-                await asyncio.sleep(STEPPED_S)
-                assert robot.base.moves
-                released_s = time.monotonic()
-            return await stopped_after_s(robot, released_s)
+            with ExitStack() as stack:
+                async with held(session, SPEED_MPS):
+                    clock.step(step_s)
+                    await asyncio.sleep(STEPPED_S)
+                    stack.enter_context(moving(robot.base, robot.drive))
+                    released_s = time.monotonic()
+                return await stopped_after_s(robot, released_s)
 
     await keeps_async(0.06, "s of motion after a release, after a step", moved_s)
 
@@ -99,21 +101,17 @@ async def test_a_release_after_a_step_stops_within_60_ms(
 async def test_a_client_that_is_frozen_after_a_step_stops_within_280_ms(
     robot: DrivenRobot, clock: CalendarClock, step_s: int
 ) -> None:
-    async def moves() -> bool:
-        return robot.base.moves
-
     async def moved_s() -> float:
         clock.step(0)
         async with available(robot):
             pass
         with driver(robot.target) as process:
-            await eventually(moves, bool, "the base moves")
             clock.step(step_s)
             await asyncio.sleep(STEPPED_S)
-            assert robot.base.moves
-            frozen_s = time.monotonic()
-            os.kill(process.pid, signal.SIGSTOP)
-            return await stopped_after_s(robot, frozen_s)
+            with moving(robot.base, robot.drive):
+                frozen_s = time.monotonic()
+                os.kill(process.pid, signal.SIGSTOP)
+                return await stopped_after_s(robot, frozen_s)
 
     await keeps_async(0.28, "s of motion after the client was frozen, after a step", moved_s)
 

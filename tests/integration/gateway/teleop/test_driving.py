@@ -8,7 +8,9 @@ import socket
 import struct
 import threading
 import time
+import uuid
 from collections.abc import AsyncIterator, Iterator
+from contextlib import AsyncExitStack
 from dataclasses import replace
 from itertools import chain, repeat
 from typing import Any
@@ -37,7 +39,16 @@ from console.client.transport import GrpcTransport
 from console.credentials import Credentials
 from omniseer.gateway.v1 import robot_gateway_pb2, teleop_pb2
 from omniseer.gateway.v1.teleop_pb2_grpc import TeleopServiceStub
-from tests.support.driven_robot import BY_EYE, DrivenRobot, available, held, in_motion, is_at_rest
+from tests.support.driven_robot import (
+    BY_EYE,
+    DrivenRobot,
+    anew_after_a_loss,
+    available,
+    held,
+    in_motion,
+    is_at_rest,
+)
+from tests.support.driving import Observer
 from tests.support.eventually import eventually
 from tests.support.relay import Relay
 from tests.support.running_gateway import raw_unary
@@ -55,6 +66,14 @@ async def client(robot: DrivenRobot) -> AsyncIterator[AsyncGatewayClient]:
         # What a test leaves behind must not stop the next one.
         async with available(robot):
             pass
+
+
+@pytest.fixture
+def observer(robot: DrivenRobot) -> Iterator[Observer]:
+    """The drive program's own word."""
+    observer = Observer(robot.drive.socket)
+    yield observer
+    observer.close()
 
 
 async def teleop_of(client: AsyncGatewayClient) -> Any:
@@ -89,6 +108,7 @@ async def test_every_time_of_motion_is_an_event(robot: DrivenRobot, client: Asyn
     assert " m, " in found[-1]
 
 
+@anew_after_a_loss
 async def test_a_hold_moves_the_robot_and_a_release_stops_it(
     robot: DrivenRobot, client: AsyncGatewayClient
 ) -> None:
@@ -107,6 +127,7 @@ async def test_a_hold_moves_the_robot_and_a_release_stops_it(
     assert all(abs(each.vx_mps) <= SPEED_MPS + 1e-6 for each in robot.base.heard)
 
 
+@anew_after_a_loss
 async def test_a_session_that_is_left_by_an_error_stops_the_robot(
     robot: DrivenRobot, client: AsyncGatewayClient
 ) -> None:
@@ -158,6 +179,7 @@ async def test_a_reset_that_is_refused_names_the_other_source(
     await eventually(lambda: teleop_of(client), lambda it: not it.stop, "the status shows it")
 
 
+@anew_after_a_loss
 async def test_hands_that_no_longer_report_are_a_release(
     robot: DrivenRobot, client: AsyncGatewayClient
 ) -> None:
@@ -168,9 +190,13 @@ async def test_hands_that_no_longer_report_are_a_release(
         await comes_to_rest(robot)
 
 
+@anew_after_a_loss
 async def test_anyone_may_stop_and_only_that_stop_is_reset(
-    robot: DrivenRobot, client: AsyncGatewayClient
+    robot: DrivenRobot, client: AsyncGatewayClient, observer: Observer
 ) -> None:
+    async def obstacle() -> str:
+        return observer.now().reset_obstacle
+
     async with client.drive(BY_EYE) as session:
         await in_motion(client, session, robot.base, SPEED_MPS)
         stopped = await client.stop_robot("a child on the track")
@@ -184,14 +210,14 @@ async def test_anyone_may_stop_and_only_that_stop_is_reset(
         await in_phase(session, DrivePhase.STOPPED)
         session.release()  # The hold has lapsed meanwhile.
         async with held(session, SPEED_MPS):
-            await asyncio.sleep(0.05)
+            await eventually(obstacle, lambda it: "the driver holds" in it, "the hold has arrived")
             for stop_id in (again.stop.stop_id, again.stop.stop_id + 1):
                 # While the driver holds; and not the stop that there is.
                 with pytest.raises(Refused) as refused:
                     await client.reset_stop(stop_id)
                 assert refused.value.reason == Reason.STOP_NOT_RESET
         session.release()
-        await asyncio.sleep(0.1)
+        await eventually(obstacle, lambda it: not it, "the release has arrived")
         await client.reset_stop(again.stop.stop_id)
         await in_phase(session, DrivePhase.ARMED)
         assert not robot.base.moves
@@ -199,27 +225,37 @@ async def test_anyone_may_stop_and_only_that_stop_is_reset(
         await in_motion(client, session, robot.base, SPEED_MPS)
 
 
+async def is_reset(client: AsyncGatewayClient, stop_id: int) -> bool:
+    try:
+        await client.reset_stop(stop_id)
+    except Refused:  # A worker that has just taken a lost one's place does not know what else commands.
+        return False
+    return True
+
+
+@anew_after_a_loss
 async def test_a_late_copy_of_a_stop_stops_nothing_anew_after_the_reset(
     robot: DrivenRobot, client: AsyncGatewayClient
 ) -> None:
     """A client sends each stop on two connections; the slower copy may come after the stop was reset."""
     async with grpc.aio.insecure_channel(robot.target) as channel:
         stub = TeleopServiceStub(channel)
-        request = teleop_pb2.StopRobotRequest(reason="a child", request_id="one")
+        request = teleop_pb2.StopRobotRequest(reason="a child", request_id=uuid.uuid4().hex)
         first = await stub.StopRobot(request)
-        await client.reset_stop(first.stop.stop_id)
+        await eventually(lambda: is_reset(client, first.stop.stop_id), bool, "it is reset")
         copy = await stub.StopRobot(request)
         assert copy.stop.stop_id == first.stop.stop_id
         assert "reset" in copy.message
         # Another request stops, and so does each that names none.
         newest = first.stop.stop_id
-        for another in ("two", "", ""):
+        for another in (uuid.uuid4().hex, "", ""):
             stopped = await stub.StopRobot(teleop_pb2.StopRobotRequest(request_id=another))
             assert stopped.stop.stop_id > newest
             newest = stopped.stop.stop_id
-            await client.reset_stop(newest)
+            await eventually(lambda: is_reset(client, newest), bool, "it is reset")  # noqa: B023  # at once
 
 
+@anew_after_a_loss
 async def test_a_lost_driver_leaves_a_stopped_robot(robot: DrivenRobot, client: AsyncGatewayClient) -> None:
     channel = grpc.aio.insecure_channel(robot.target, options=(("grpc.use_local_subchannel_pool", 1),))
     async with channel:
@@ -264,6 +300,7 @@ def raw_command(sequence: int, state: Any, *, held: bool) -> Any:
     return teleop_pb2.DriveRequest(command=command)
 
 
+@anew_after_a_loss
 async def test_one_lane_may_go(robot: DrivenRobot, client: AsyncGatewayClient) -> None:
     async with client.drive(BY_EYE) as session:
         assert session.open_lanes == LANES, "from the beginning"
@@ -277,6 +314,7 @@ async def test_one_lane_may_go(robot: DrivenRobot, client: AsyncGatewayClient) -
         assert robot.base.moves
 
 
+@anew_after_a_loss
 async def test_a_lane_that_vanishes_comes_back_and_costs_no_session(
     robot: DrivenRobot, client: AsyncGatewayClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -321,7 +359,9 @@ def one_lane(
 async def test_a_session_opens_though_its_second_lane_does_not(
     robot: DrivenRobot, client: AsyncGatewayClient, one_lane: DriveSession
 ) -> None:
-    async with asyncio.timeout(PATIENCE_S), one_lane as session:
+    async with AsyncExitStack() as stack:
+        async with asyncio.timeout(PATIENCE_S):
+            session = await stack.enter_async_context(one_lane)
         assert session.open_lanes == 1
         await in_motion(client, session, robot.base, SPEED_MPS)
 
@@ -341,6 +381,7 @@ async def test_a_session_given_up_while_it_opens_leaves_no_driver(
     await eventually(holder, lambda it: not it, "nobody has the lease")
 
 
+@anew_after_a_loss
 async def test_another_driver_waits_or_takes_over(robot: DrivenRobot, client: AsyncGatewayClient) -> None:
     async with AsyncGatewayClient(robot.target) as other, client.drive(BY_EYE) as session:
         await in_motion(client, session, robot.base, SPEED_MPS)
@@ -386,6 +427,7 @@ async def test_without_a_picture_nothing_moves_under_supervision(
         assert not robot.base.moves
 
 
+@anew_after_a_loss
 async def test_disabling_ends_the_session(robot: DrivenRobot, client: AsyncGatewayClient) -> None:
     async with client.drive(BY_EYE) as session:
         await in_motion(client, session, robot.base, SPEED_MPS)
@@ -412,6 +454,7 @@ async def may_be_driven(client: AsyncGatewayClient) -> None:
         await session.ready(PATIENCE_S)
 
 
+@anew_after_a_loss
 async def test_single_commands_of_older_tools_move_slowly_and_not_for_long(
     robot: DrivenRobot, client: AsyncGatewayClient
 ) -> None:
@@ -438,6 +481,7 @@ async def sent_on_a_channel_of_its_own(robot: DrivenRobot, method: str, request:
         return await call(request, timeout=5)
 
 
+@anew_after_a_loss
 async def test_the_bytes_of_tools_in_the_field_drive_and_every_command_ends_by_itself(
     robot: DrivenRobot, client: AsyncGatewayClient
 ) -> None:

@@ -20,7 +20,7 @@ from console.client import (
     Refused,
     StopLatch,
 )
-from tests.support.driven_robot import BY_EYE, DrivenRobot, available, driven_robot, held, in_motion
+from tests.support.driven_robot import BY_EYE, DrivenRobot, available, driven_robot, held, in_motion, moving
 from tests.support.eventually import eventually
 from tests.support.promise import keeps_async
 
@@ -60,13 +60,14 @@ async def moved_s(
     """How long the base moves after the gateway got the first signal; the rest follow after FROZEN_S."""
     await in_motion(client, session, robot.base, SPEED_MPS)
     async with held(session, SPEED_MPS):
-        began_s = time.monotonic()
-        for number in numbers:
-            os.kill(robot.gateway.process.pid, number)
-            await asyncio.sleep(FROZEN_S)
-        await asyncio.sleep(BLOCKED_S + QUIET_S - FROZEN_S * len(numbers))
-        session.check()
-        return robot.base.stopped_after_s(began_s)
+        with moving(robot.base, robot.drive):
+            began_s = time.monotonic()
+            for number in numbers:
+                os.kill(robot.gateway.process.pid, number)
+                await asyncio.sleep(FROZEN_S)
+            await asyncio.sleep(BLOCKED_S + QUIET_S - FROZEN_S * len(numbers))
+            session.check()
+            return robot.base.stopped_after_s(began_s)
 
 
 async def test_a_gateway_whose_loop_is_blocked_for_a_second_stops_within_280_ms(

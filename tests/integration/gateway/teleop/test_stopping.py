@@ -24,6 +24,7 @@ from tests.support.driven_robot import (
     driven_base,
     driven_robot,
     in_motion,
+    moving,
     stop_by,
 )
 from tests.support.eventually import eventually
@@ -31,6 +32,7 @@ from tests.support.guarded_program import Guarded, guarded_program
 from tests.support.heard import Base
 from tests.support.module_program import module_program
 from tests.support.promise import keeps_async
+from tests.support.running_drive import RunningDrive
 
 pytestmark = [pytest.mark.ros, pytest.mark.timed, pytest.mark.alone]
 ROOT = Path(__file__).parents[4]
@@ -54,18 +56,14 @@ async def stopped_after_s(
     async with available(robot):
         pass
     with module_program("tests.support.driver_program", target, says="driving") as process:
-        await eventually(lambda: moves(robot), bool, "the base moves")
-        began_s = time.monotonic()
-        fault(process.pid)
-        await asyncio.sleep(FROZEN_S)
-        recovery(process.pid)
-        await asyncio.sleep(QUIET_S)
-        assert not await moves(robot), "the last message is zero"
+        with moving(robot.base, robot.drive):
+            began_s = time.monotonic()
+            fault(process.pid)
+            await asyncio.sleep(FROZEN_S)
+            recovery(process.pid)
+            await asyncio.sleep(QUIET_S)
+            assert not robot.base.moves, "the last message is zero"
         return robot.base.stopped_after_s(began_s)
-
-
-async def moves(robot: DrivenRobot) -> bool:
-    return robot.base.moves
 
 
 async def test_a_release_stops_within_60_ms(robot: DrivenRobot) -> None:
@@ -74,9 +72,10 @@ async def test_a_release_stops_within_60_ms(robot: DrivenRobot) -> None:
             slowest_s = 0.0
             for _ in range(5):
                 await in_motion(client, session, robot.base, SPEED_MPS)
-                began_s = time.monotonic()
-                session.release()
-                await asyncio.sleep(QUIET_S)
+                with moving(robot.base, robot.drive):
+                    began_s = time.monotonic()
+                    session.release()
+                    await asyncio.sleep(QUIET_S)
                 slowest_s = max(slowest_s, robot.base.stopped_after_s(began_s))
             return slowest_s
 
@@ -171,12 +170,14 @@ async def test_a_revoked_driver_stops_within_1_1_s(ros_domain: int, tmp_path: Pa
             ):
                 credential, bundle = robot.admin.add(CredentialRequest("anna", Role.OPERATOR, Kind.TOKEN))
                 anna = parse_login(bundle.text()).credentials
-                return await revoked_s(robot, base, anna, credential.credential_id)
+                return await revoked_s(robot, base, drive, anna, credential.credential_id)
 
     await keeps_async(1.1, "s of motion after the driver's credential was revoked", measure)
 
 
-async def revoked_s(robot: Guarded, base: Base, anna: Credentials, credential_id: str) -> float:
+async def revoked_s(
+    robot: Guarded, base: Base, drive: RunningDrive, anna: Credentials, credential_id: str
+) -> float:
     async with (
         AsyncGatewayClient(robot.target, credentials=robot.own) as admin,
         AsyncGatewayClient(robot.target, credentials=anna) as client,
@@ -184,17 +185,18 @@ async def revoked_s(robot: Guarded, base: Base, anna: Credentials, credential_id
         await eventually(lambda: enabled(admin), bool, "driving is enabled")
         async with client.drive(BY_EYE) as session:
             await in_motion(client, session, base, SPEED_MPS)
-            began_s = time.monotonic()
-            robot.admin.revoke(credential_id)
-            while time.monotonic() - began_s < QUIET_S + 1.1:
-                session.hold(SPEED_MPS)
-                await asyncio.sleep(0.02)
-            assert isinstance(session.error, NotAllowed)
-            teleop = (await admin.status()).teleop
-            assert teleop.stop is not None
-            assert not teleop.holder
-            assert DriveInhibit.ACCESS_ENDED in teleop.inhibits
-            assert not base.moves, "the last message is zero"
+            with moving(base, drive):
+                began_s = time.monotonic()
+                robot.admin.revoke(credential_id)
+                while time.monotonic() - began_s < QUIET_S + 1.1:
+                    session.hold(SPEED_MPS)
+                    await asyncio.sleep(0.02)
+                assert isinstance(session.error, NotAllowed)
+                teleop = (await admin.status()).teleop
+                assert teleop.stop is not None
+                assert not teleop.holder
+                assert DriveInhibit.ACCESS_ENDED in teleop.inhibits
+                assert not base.moves, "the last message is zero"
             return base.stopped_after_s(began_s)
 
 
