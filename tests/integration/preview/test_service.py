@@ -8,6 +8,7 @@ import pytest
 
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from tests.support.free import udp_port_is_free
+from tests.support.promise import keeps
 from tests.support.recording import record
 from tests.support.running_preview import RunningPreview
 from tests.support.waiting import wait_until
@@ -93,26 +94,29 @@ def test_on_off_on_in_one_breath_ends_on(preview: RunningPreview) -> None:
         watcher.wait_for_frames(5)
 
 
+@pytest.mark.timed
 def test_a_profile_switch_keeps_every_viewer(preview: RunningPreview) -> None:
     def runs_at(fps: int, actual: pb.ActualState) -> bool:
         return abs(actual.measurement.fps - fps) < fps / 5 and actual.stream.fps == fps
 
+    def longest_pause_s() -> float:
+        with Watcher(preview.port) as watcher:
+            watcher.wait_for_frames(10)
+            for profile, fps in (
+                (pb.PROFILE_HIGH_QUALITY, 60),
+                (pb.PROFILE_LOW_BW, 15),
+                (pb.PROFILE_BALANCED, 30),
+            ):
+                preview.enable(profile)
+                state = preview.wait_for(partial(runs_at, fps), f"{fps} fps")
+                assert state.state == pb.LIFECYCLE_STATE_RUNNING
+                watcher.wait_for_frames(10)
+            assert watcher.reconnects == 0
+            return watcher.longest_pause_s
+
     preview.enable(pb.PROFILE_BALANCED)
     preview.running()
-    with Watcher(preview.port) as watcher:
-        watcher.wait_for_frames(10)
-        for profile, fps in (
-            (pb.PROFILE_HIGH_QUALITY, 60),
-            (pb.PROFILE_LOW_BW, 15),
-            (pb.PROFILE_BALANCED, 30),
-        ):
-            preview.enable(profile)
-            state = preview.wait_for(partial(runs_at, fps), f"{fps} fps")
-            assert state.state == pb.LIFECYCLE_STATE_RUNNING
-            watcher.wait_for_frames(10)
-        assert watcher.reconnects == 0
-        assert watcher.longest_pause_s < 0.5
-        print(f"longest gap {watcher.longest_pause_s * 1000:.0f} ms")
+    keeps(0.5, "s without a picture while the profile is switched", longest_pause_s)
     assert preview.running().counters.starts == 1
 
 

@@ -12,6 +12,7 @@ import pytest
 
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from tests.support.film import clip
+from tests.support.promise import keeps
 from tests.support.running_preview import RunningPreview
 from tests.support.stalling_camera import StallingCamera
 from tests.support.waiting import wait_until
@@ -46,21 +47,25 @@ def shared_memory(socket: Path, caps: str) -> Iterator[Path]:
             process.kill()
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize("container", ["matroskamux", "mp4mux", "mpegtsmux"])
 def test_a_file_is_played_again_and_again_at_its_own_speed(tmp_path: Path, container: str) -> None:
     film = clip(1.0, tmp_path / 'a film\'s "name".bin', container)
     with RunningPreview(tmp_path, {"source": {"kind": "file", "path": str(film)}}) as preview:
         preview.enable()
         preview.running()
-        with Watcher(preview.port) as watcher:
-            watcher.wait_for_frames(100)
-            state = preview.wait_for(lambda a: a.measurement.fps > 0, "figures")
-        assert state.counters == pb.Counters(starts=1)
-        assert watcher.reconnects == 0
-        assert watcher.longest_pause_s < 0.5
-        seconds = watcher.arrivals_s[-1] - watcher.arrivals_s[0]
-        assert 20 < len(watcher.arrivals_s) / seconds < 30
-        print(f"{container}: longest pause {watcher.longest_pause_s * 1000:.0f} ms over {seconds:.1f} s")
+
+        def longest_pause_s() -> float:
+            with Watcher(preview.port) as watcher:
+                watcher.wait_for_frames(100)
+                state = preview.wait_for(lambda a: a.measurement.fps > 0, "figures")
+            assert state.counters == pb.Counters(starts=1)
+            assert watcher.reconnects == 0
+            seconds = watcher.arrivals_s[-1] - watcher.arrivals_s[0]
+            assert 20 < len(watcher.arrivals_s) / seconds < 30
+            return watcher.longest_pause_s
+
+        keeps(0.5, f"s without a picture of a film in {container}", longest_pause_s)
 
 
 def test_real_footage_of_another_size_is_scaled(tmp_path: Path) -> None:

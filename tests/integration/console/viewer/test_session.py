@@ -15,6 +15,7 @@ from console.viewer.session import VideoSession
 from tests.integration.console.viewer.conftest import following
 from tests.support.free import free_udp_port
 from tests.support.judges import decoded_frames
+from tests.support.promise import keeps
 from tests.support.streams import SrtSender, encode
 from tests.support.video_ground import VideoGround, video_ground
 from tests.support.waiting import wait_until
@@ -50,42 +51,55 @@ def test_it_follows_the_preview_from_off_to_on_and_back(ground: VideoGround, ses
     assert session.latest_frame() is None
 
 
+@pytest.mark.timed
 def test_a_killed_preview_is_a_freeze_at_once_and_back_at_once(
     ground: VideoGround, session: VideoSession
 ) -> None:
+    def of_its_limit() -> float:
+        becomes(session, PlaybackState.LIVE)
+        redials = session.redials
+        ground.kill_preview()
+        died_s = time.monotonic()
+        wait_until(lambda: not is_live(session), "the freeze shows")
+        frozen_s = time.monotonic() - died_s
+        # The gateway says why a moment later; the frame that stands still stays marked as one.
+        becomes(session, PlaybackState.FAULTED)
+        assert session.playback().frame_age_s is not None
+        assert "unreachable" in session.playback().reason
+        wait_until(lambda: session.redials > redials, "called again")
+
+        ground.preview.start_again()
+        ground.preview.running()
+        returned_s = time.monotonic()
+        back_s = becomes(session, PlaybackState.LIVE) - returned_s
+        return max(frozen_s / FREEZE_SHOWN_WITHIN_S, back_s / BACK_WITHIN_S)
+
     ground.switch_on()
-    becomes(session, PlaybackState.LIVE)
-    ground.kill_preview()
-    died_s = time.monotonic()
-    wait_until(lambda: not is_live(session), "the freeze shows")
-    assert time.monotonic() - died_s < FREEZE_SHOWN_WITHIN_S
-    # The gateway says why a moment later; the frame that stands still stays marked as one.
-    becomes(session, PlaybackState.FAULTED)
-    assert session.playback().frame_age_s is not None
-    assert "unreachable" in session.playback().reason
-    wait_until(lambda: session.redials >= 1, "called again")
-
-    ground.preview.start_again()
-    ground.preview.running()
-    returned_s = time.monotonic()
-    assert becomes(session, PlaybackState.LIVE) - returned_s < BACK_WITHIN_S
+    keeps(1.0, "time until a freeze shows, or is over, of its limit", of_its_limit)
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize("redials", [1, 3])
 def test_a_preview_that_stands_still_is_a_freeze_and_goes_on(
     ground: VideoGround, session: VideoSession, redials: int
 ) -> None:
     """For a moment, and for longer than SRT itself keeps a connection."""
+
+    def of_its_limit() -> float:
+        becomes(session, PlaybackState.LIVE)
+        before = session.redials
+        ground.preview.process.send_signal(signal.SIGSTOP)
+        stopped_s = time.monotonic()
+        wait_until(lambda: not is_live(session), "the freeze shows")
+        frozen_s = time.monotonic() - stopped_s
+        wait_until(lambda: session.redials >= before + redials, "called again")
+        ground.preview.process.send_signal(signal.SIGCONT)
+        went_on_s = time.monotonic()
+        back_s = becomes(session, PlaybackState.LIVE) - went_on_s
+        return max(frozen_s / FREEZE_SHOWN_WITHIN_S, back_s / BACK_WITHIN_S)
+
     ground.switch_on()
-    becomes(session, PlaybackState.LIVE)
-    ground.preview.process.send_signal(signal.SIGSTOP)
-    stopped_s = time.monotonic()
-    wait_until(lambda: not is_live(session), "the freeze shows")
-    assert time.monotonic() - stopped_s < FREEZE_SHOWN_WITHIN_S
-    wait_until(lambda: session.redials >= redials, "called again")
-    ground.preview.process.send_signal(signal.SIGCONT)
-    went_on_s = time.monotonic()
-    assert becomes(session, PlaybackState.LIVE) - went_on_s < BACK_WITHIN_S
+    keeps(1.0, "time until a freeze shows, or is over, of its limit", of_its_limit)
 
 
 def test_frames_go_on_without_the_gateway(ground: VideoGround, session: VideoSession) -> None:
@@ -184,15 +198,19 @@ def test_a_disk_that_does_not_answer_delays_neither_the_video_nor_the_end(ground
         os.close(slave)
 
 
+@pytest.mark.timed
 def test_closing_takes_no_time_whatever_it_does() -> None:
-    absent = StreamAddress("127.0.0.1", free_udp_port(), 20)
-    session = VideoSession()
-    session.start()
-    session.follow(preview(PreviewState.RUNNING, port=absent.port))
-    wait_until(lambda: session.redials >= 1, "no answer, it has redialed")
-    begun_s = time.monotonic()
-    assert session.close()
-    assert time.monotonic() - begun_s < 1.5
+    def took_s() -> float:
+        absent = StreamAddress("127.0.0.1", free_udp_port(), 20)
+        session = VideoSession()
+        session.start()
+        session.follow(preview(PreviewState.RUNNING, port=absent.port))
+        wait_until(lambda: session.redials >= 1, "no answer, it has redialed")
+        begun_s = time.monotonic()
+        assert session.close()
+        return time.monotonic() - begun_s
+
+    keeps(1.5, "s to close a session", took_s)
 
 
 def test_an_encrypted_stream_needs_nothing_more(tmp_path: Path) -> None:

@@ -83,26 +83,31 @@ def test_the_window_adds_less_than_one_and_a_half_frames_to_the_latency(tmp_path
     keeps(1.5, "frames from decoded to painted", extra_frames)
 
 
+@pytest.mark.timed
 def test_a_freeze_is_painted_at_once_and_gone_when_the_video_is_back(
     ground: VideoGround, view: ViewWindow
 ) -> None:
+    def of_its_limit() -> float:
+        shows(view, PlaybackState.LIVE)
+        until(lambda: not banner_is_on_screen(view), "the frame alone")
+        ground.kill_preview()
+        died_s = time.monotonic()
+        until(lambda: banner_is_on_screen(view), "the banner")
+        frozen_s = time.monotonic() - died_s
+        let_pass(0.8)
+        keep(view, "frozen")
+        shows(view, PlaybackState.FAULTED)
+        let_pass(0.3)
+        keep(view, "faulted")
+        ground.preview.start_again()
+        ground.preview.running()
+        returned_s = time.monotonic()
+        until(lambda: not banner_is_on_screen(view), "the frame alone")
+        back_s = time.monotonic() - returned_s
+        return max(frozen_s / FREEZE_SHOWN_WITHIN_S, back_s / BACK_WITHIN_S)
+
     ground.switch_on()
-    shows(view, PlaybackState.LIVE)
-    until(lambda: not banner_is_on_screen(view), "the frame alone")
-    ground.kill_preview()
-    died_s = time.monotonic()
-    until(lambda: banner_is_on_screen(view), "the banner")
-    assert time.monotonic() - died_s < FREEZE_SHOWN_WITHIN_S
-    let_pass(0.8)
-    keep(view, "frozen")
-    shows(view, PlaybackState.FAULTED)
-    let_pass(0.3)
-    keep(view, "faulted")
-    ground.preview.start_again()
-    ground.preview.running()
-    returned_s = time.monotonic()
-    until(lambda: not banner_is_on_screen(view), "the frame alone")
-    assert time.monotonic() - returned_s < BACK_WITHIN_S
+    keeps(1.0, "time until a freeze is painted, or is over, of its limit", of_its_limit)
 
 
 def test_a_person_switches_the_preview_with_a_key(ground: VideoGround, view: ViewWindow) -> None:
