@@ -10,10 +10,11 @@ from PySide6.QtCore import QEvent, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from console.client import Supervision
+from console.client import AsyncGatewayClient, Supervision
 from console.window.monitor_window import MonitorWindow
 from console.window.programs import monitor, reading_gamepad
-from tests.support.driven_robot import DrivenRobot, available, driven_robot
+from tests.support.driven_robot import DrivenRobot, available, driven_robot, moving
+from tests.support.lost_worker import reset_after_a_loss
 from tests.support.promise import keeps
 from tests.support.qt import let_pass, until
 from tests.support.virtual_pad import VirtualPad, virtual_pad
@@ -44,10 +45,12 @@ class Seat:
 
     def begins(self, hold: Callable[[], None], let_go: Callable[[], None]) -> None:
         """Takes the robot, holds, and lets it come to speed; a machine that is too busy needs another try."""
+        let_go()
         self.window.driving.begin(Supervision.LINE_OF_SIGHT, False)
-        until(lambda: self.window._worker.driver.view().ready, "the robot may be driven", 30)
         until(lambda: self.window.driving.hands.pad is not None, "the gamepad")
         for _ in range(_ATTEMPTS):
+            asyncio.run(reset(self.robot))
+            until(lambda: self.window._worker.driver.view().ready, "the robot may be driven", 30)
             let_pass(0.2)
             hold()
             let_pass(0.6)
@@ -58,10 +61,11 @@ class Seat:
 
     def stopped_after_ms(self, act: Callable[[], object]) -> float:
         """Acts, and returns how long the motion lasts after it."""
-        since_s = time.monotonic()
-        act()
-        let_pass(0.5)
-        return self.robot.base.stopped_after_s(since_s) * 1000
+        with moving(self.robot.base, self.robot.drive):
+            since_s = time.monotonic()
+            act()
+            let_pass(0.5)
+            return self.robot.base.stopped_after_s(since_s) * 1000
 
     def plug_in(self) -> None:
         """Plugs a gamepad in, if none is."""
@@ -93,6 +97,12 @@ def seat(robot: DrivenRobot) -> Iterator[Seat]:
         seat = Seat(robot, window, pad)
         yield seat
         seat.pad.unplug()
+
+
+async def reset(robot: DrivenRobot) -> None:
+    """Resets a stop that a lost worker of the drive program has left."""
+    async with AsyncGatewayClient(robot.target) as client:
+        await reset_after_a_loss(client)
 
 
 async def freed(robot: DrivenRobot) -> None:
