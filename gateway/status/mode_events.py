@@ -7,8 +7,8 @@ from common.token_bucket import TokenBucket
 from gateway.status.event import Event, ModeChanged
 from gateway.status.fault import Severity
 
-BURST: Final = 20
-"""Events at once: no mission has so many phases within seconds."""
+BURST: Final = 100
+"""Events at once, a tenth of the log: no mission has so many phases within minutes."""
 SPACING_S: Final = 30.0
 """Beyond them, of one event and the next. Where two programs publish different modes, each look finds another
 one for ever: that must not push other events out of the log."""

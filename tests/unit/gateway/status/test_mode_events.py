@@ -59,21 +59,21 @@ def test_a_mode_that_alternates_without_end_is_few_events(robot: Robot) -> None:
 
 
 def test_what_was_left_out_is_counted_and_the_last_mode_is_reported(robot: Robot) -> None:
-    robot.alternates(60)
+    robot.alternates(120)
     robot.is_in("charging", SPACING_S)
     assert robot.modes[-1] == "charging"
     counts = [
         1 + int(message.rpartition(" after ")[2].split()[0]) if " after " in message else 1
         for message in robot.messages
     ]
-    assert sum(counts) == 300, "299 alternations from the first idle on, and the last mode"
+    assert sum(counts) == 600, "599 alternations from the first idle on, and the last mode"
     robot.is_in("charging", 10 * SPACING_S)
     assert robot.modes.count("charging") == 1
 
 
 def test_a_mode_that_is_the_last_reported_one_again_is_reported_with_what_was_between() -> None:
     robot = Robot()
-    robot.alternates(60)
+    robot.alternates(120)
     robot.is_in(robot.modes[-1], 2 * SPACING_S)
     assert robot.modes[-1] == robot.modes[-2]
     assert " after " in robot.messages[-1]
