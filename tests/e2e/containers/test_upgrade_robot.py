@@ -353,6 +353,15 @@ def test_an_upgrade_that_was_killed_is_finished_by_the_next_command(robot: Robot
     assert not marker.exists()
 
 
+def test_an_upgrade_that_was_killed_before_it_said_what_it_changes_is_no_obstacle(robot: Robot) -> None:
+    robot.begin()
+    (robot.directory / ".upgrade").mkdir()
+    (robot.directory / ".upgrade/switching").touch()
+    assert robot.upgrade(robot.release("9.1.0")).returncode == 0
+    assert robot.running() == "9.1.0"
+    assert not (robot.directory / ".upgrade/switching").exists()
+
+
 def test_two_at_a_time_are_refused(robot: Robot) -> None:
     robot.begin()
     (robot.directory / ".upgrade").mkdir()
