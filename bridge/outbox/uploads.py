@@ -23,7 +23,9 @@ class StoredUploads:
         self._outbox = outbox
 
     async def uploads(self) -> list[Upload]:
-        """Returns all rows, with `due_s` 0; one that can't be understood is left out.
+        """Returns all rows; one that can't be understood is left out.
+
+        What counts for one process only is as in a new `Upload`: `due_s`, `since_s`, `cuts`.
 
         Raises:
             OSError: the disk can't be read.

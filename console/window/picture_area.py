@@ -67,6 +67,7 @@ class PictureArea(QWidget):
 
     def show_motion(self, motion: Motion | None, trail: Trail) -> None:
         """Shows the gauges, on a robot that has odometry, and its trail as soon as it has moved."""
+        had_gauges = not self.speed.isHidden()
         self.speed.setVisible(motion is not None)
         self.turn.setVisible(motion is not None)
         if motion:
@@ -74,6 +75,8 @@ class PictureArea(QWidget):
             self.turn.show_reading(motion.turn, stale=motion.stale)
         self.trail.setVisible(trail.moved)
         self.trail.show_trail(trail)
+        if had_gauges is not (motion is not None):
+            self._place_messages()  # The tiles stand above a gauge, or in its place.
 
     def show_driving(self, display: DriveDisplay | None) -> None:
         """Shows the head-up display, on a robot that can be driven."""

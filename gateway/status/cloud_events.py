@@ -2,7 +2,7 @@
 
 from collections import OrderedDict
 from collections.abc import Iterator
-from typing import Final
+from typing import Final, TypeVar
 
 from common.token_bucket import TokenBucket
 from gateway.status.cloud import CloudState, CloudView, CopyReport, RecordingCopyState
@@ -10,11 +10,13 @@ from gateway.status.event import CloudChanged, Event, RecordingCopyChanged
 from gateway.status.fault import Severity
 from gateway.status.recording import RecorderView
 
+_T = TypeVar("_T")
+
 _COMPONENT: Final = "fleet"
 SETTLED_S: Final = 5.0
 """A state of the connection that has lasted so long is an event."""
 REMEMBERED: Final = 1024
-"""Recordings whose last event is remembered."""
+"""Recordings of which something is remembered."""
 BURST: Final = 64
 """Events of copies at once, as many as a report has copies; then one a second. The others come later."""
 _SENTENCES: Final = {
@@ -32,7 +34,8 @@ _ENDS: Final = frozenset({RecordingCopyState.VERIFIED, RecordingCopyState.FAILED
 class CloudEvents:
     """Compares each view with those before. The first settled state and the first copies are no events.
 
-    Nor is a copy that ended before the first report, which has room for few: others come later.
+    Nor is a copy that ended before the first report, which has room for few: others come later. One that was
+    seen on its way did not; of another the bridge says how long ago it ended, if it can.
     """
 
     def __init__(self) -> None:
@@ -42,6 +45,8 @@ class CloudEvents:
         """None before the first."""
         self._ends: OrderedDict[str, RecordingCopyState] = OrderedDict()
         """The newest event of a recording's copy."""
+        self._on_their_way: OrderedDict[str, None] = OrderedDict()
+        """Recordings whose copy had not ended when it was seen last."""
         self._began_s: float | None = None
         """When the first report was seen."""
         self._bucket = TokenBucket(BURST, 0.0)
@@ -71,16 +76,26 @@ class CloudEvents:
         began_s = self._began_s = now_s if self._began_s is None else self._began_s
         for each in copies:
             state, known = each.copy.state, self._ends.get(each.recording_id)
-            if state not in _ENDS or state is known:
+            if state not in _ENDS:
+                _remember(self._on_their_way, each.recording_id, None)
                 continue
-            if not first and each.since_s is not None and each.since_s >= began_s:
+            if state is known:
+                continue
+            ended_since = each.since_s is not None and each.since_s >= began_s
+            if not first and (ended_since or each.recording_id in self._on_their_way):
                 if not self._bucket.take(now_s, capacity=BURST, refill_per_s=1.0):
                     return
                 yield _copied(each, _label(recorder, each.recording_id))
-            self._ends[each.recording_id] = state
-            self._ends.move_to_end(each.recording_id)
-            if len(self._ends) > REMEMBERED:
-                self._ends.popitem(last=False)
+            self._on_their_way.pop(each.recording_id, None)
+            _remember(self._ends, each.recording_id, state)
+
+
+def _remember(recordings: OrderedDict[str, _T], recording_id: str, what: _T) -> None:
+    """Keeps something of a recording, and forgets the oldest beyond REMEMBERED."""
+    recordings[recording_id] = what
+    recordings.move_to_end(recording_id)
+    if len(recordings) > REMEMBERED:
+        recordings.popitem(last=False)
 
 
 def _changed(state: CloudState, last_error: str) -> Event:

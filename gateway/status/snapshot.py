@@ -178,16 +178,18 @@ def take(
         samples[spec] = sample(board[spec], rules.platform_stale_after_ms, now_s)
     unpassed_s = 0.0 if board.ros_passed_s is None else now_s - board.ros_passed_s
     ros_stalled = unpassed_s > ROS_STALLED_AFTER_S
-    unread = {spec for spec, rule in configured.items() if _unread(board, spec, rule, samples[spec])}
-    not_read = unread if unpassed_s > _ROS_LATE_AFTER_S else set()
+    since_pass = {
+        spec for spec, rule in configured.items() if _stale_since_pass(board, spec, rule, samples[spec])
+    }
+    late = since_pass if unpassed_s > _ROS_LATE_AFTER_S else set()
     if ros_stalled:
-        not_read = set(configured)
+        late = set(configured)
     return Snapshot(
         at_s=now_s,
         identity=setup.identity,
         gateway=noted.gateway,
         health=NOT_READ
-        if ros_stalled or any(configured[spec].required for spec in not_read)
+        if ros_stalled or any(configured[spec].required for spec in late)
         else assess(
             (
                 (spec.health_name or spec.display_name, samples[spec].freshness)
@@ -211,8 +213,8 @@ def take(
                 required=rule.required,
                 unusable=board.unusable.get(spec),
                 undecodable=spec in board.undecodable,
-                unread=spec in unread,
-                not_read=spec in not_read,
+                stale_since_pass=spec in since_pass,
+                sampler_late=spec in late,
             )
             for spec, rule in configured.items()
         ),
@@ -226,7 +228,7 @@ def take(
     )
 
 
-def _unread(board: Board, spec: SourceSpec[Any], rule: SourceRule, now: Sample[Any]) -> bool:
+def _stale_since_pass(board: Board, spec: SourceSpec[Any], rule: SourceRule, now: Sample[Any]) -> bool:
     """Returns whether a value is stale now, but was not at the sampler's last pass: a newer one may wait."""
     passed_s = board.ros_passed_s
     if passed_s is None or not now.freshness.stale:

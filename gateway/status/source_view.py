@@ -36,7 +36,8 @@ class SourceView(NamedTuple):
 
     Attributes:
         detail: explains the state; empty if all is well.
-        unread: whether it is stale only since the ROS sampler last passed, which accuses no publisher.
+        stale_since_pass: whether it is stale only since the ROS sampler last passed: that accuses no
+            publisher.
     """
 
     spec: SourceSpec[Any]
@@ -44,7 +45,7 @@ class SourceView(NamedTuple):
     freshness: Freshness
     required: bool
     detail: str
-    unread: bool
+    stale_since_pass: bool
 
 
 _SENTENCES: Final[Mapping[SourceState, str]] = {
@@ -73,8 +74,8 @@ def source_view(
     required: bool,
     unusable: Unusable | None,
     undecodable: bool,
-    unread: bool,
-    not_read: bool,
+    stale_since_pass: bool,
+    sampler_late: bool,
 ) -> SourceView:
     """Returns the view of one source.
 
@@ -85,13 +86,13 @@ def source_view(
         required: whether the configuration requires it.
         unusable: why it is not subscribed; None if it is.
         undecodable: whether its newest message could not be decoded.
-        unread: whether it is stale only since the ROS sampler last passed.
-        not_read: whether that was too long ago to judge by silence.
+        stale_since_pass: whether it is stale only since the ROS sampler last passed.
+        sampler_late: whether that was too long ago to judge by silence.
     """
     state = _state(freshness, publishers, unusable=unusable, undecodable=undecodable)
-    blames_silence = not_read and state in _BLAMES_SILENCE
+    blames_silence = sampler_late and state in _BLAMES_SILENCE
     sentence = _NOT_READ if blames_silence else detail(state, spec.display_name, publishers)
-    return SourceView(spec, state, freshness, required, sentence, unread)
+    return SourceView(spec, state, freshness, required, sentence, stale_since_pass)
 
 
 def detail(state: SourceState, name: str, publishers: Publishers | None) -> str:

@@ -223,12 +223,20 @@ class Stops:
             )
             raise PreconditionError(f"stop {stop_id} can't be reset: {present}", Reason.STOP_NOT_RESET)
 
+        obstructed = set[int]()
+        """When the stop was reported with an obstacle."""
+
         def answered() -> bool:
-            # A report of this stop without an obstacle is from before the reset has arrived.
+            # A report of this stop may be from before the reset has arrived; the second one with an obstacle
+            # is not.
             actual = _report_since(self._link.view, now_ns)
-            return actual is not None and (
-                actual.stop is None or actual.stop.stop_id != stop_id or bool(actual.reset_obstacle)
-            )
+            if actual is None:
+                return False
+            if actual.stop is None or actual.stop.stop_id != stop_id:
+                return True
+            if actual.reset_obstacle:
+                obstructed.add(actual.monotonic_ns)
+            return len(obstructed) > 1
 
         self._pace.forget()
         sent = self._commands.reset(stop_id)

@@ -99,7 +99,7 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ),
         ("fleet/replies.py", ("nats", "nkeys", "fleet.session", "fleet.connection")),
         ("bridge/", ("console.cli", "console.fleet", "console.monitor", "console.window", "console.viewer")),
-        ("hub/exporter/", ("hub.receiver", "hub.administration", "hub.creation", "boto3")),
+        ("hub/exporter/", ("hub.receiver", "hub.accounts", "hub.administration", "hub.creation", "boto3")),
         ("console/fleet/", (*HEAVY, "grpc", "nats", "nkeys", "typer", "rich", "console.cli")),
         *(
             (f"console/fleet/{name}.py", ("asyncio", "time", "google.protobuf", "omniseer"))

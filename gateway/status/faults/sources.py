@@ -71,5 +71,5 @@ def _is_fault(source: SourceView, *, settled: bool) -> bool:
         # Not every robot has all the sources that the default configuration lists.
         return source.required
     if source.state in {SourceState.SILENT, SourceState.STALE}:
-        return not source.unread and (source.required or not source.spec.quiet)
+        return not source.stale_since_pass and (source.required or not source.spec.quiet)
     return True

@@ -145,3 +145,15 @@ def test_while_it_does_not_answer_nothing_is_concluded_of_copies() -> None:
     seen = view(connected(), NOW_S, copies=(copy_of("b", State.VERIFIED),))
     assert it.look(seen.lost("gone", NOW_S)) == []
     assert it.copies(copy_of("b", State.VERIFIED)) == [], "this is the baseline"
+
+
+@pytest.mark.parametrize("state", [State.VERIFIED, State.FAILED])
+def test_a_copy_that_was_seen_on_its_way_is_news_also_where_the_bridge_knows_no_age(state: State) -> None:
+    """An older bridge says of no copy since when it has its state, a restarted one of none from before."""
+    it = Ground()
+    on_its_way = replace(copy_of("b", State.UPLOADING), since_s=None)
+    assert it.reported(on_its_way) == []
+    it.now_s += 60
+    ended_copy = replace(copy_of("b", state), since_s=None)
+    assert [name for name, *_ in it.reported(ended_copy)] == ["b"]
+    assert it.reported(ended_copy) == []

@@ -109,9 +109,15 @@ class Drive:
         """Takes a reset a moment later; a report from before that comes first."""
         loop = asyncio.get_running_loop()
         loop.call_soon(self.report)
-        if not (self.hangs or self.obstacle):
-            loop.call_later(ON_ITS_WAY_S, self._report, DrivePhase.AVAILABLE, None)
+        if not self.hangs:
+            loop.call_later(ON_ITS_WAY_S, self._take_reset)
         return True
+
+    def _take_reset(self) -> None:
+        if self.obstacle:
+            self.report()
+        else:
+            self._report(DrivePhase.AVAILABLE, None)
 
     def report(self) -> None:
         """Reports that nothing has changed, as it does all the time."""
@@ -206,6 +212,15 @@ async def test_an_obstacle_is_an_answer_at_once(drive: Drive) -> None:
     with pytest.raises(PreconditionError, match="is not reset: the driver holds"):
         await stops.reset(stop.stop_id)
     assert asyncio.get_running_loop().time() < CONFIRMED_WITHIN_S
+
+
+@in_virtual_time
+async def test_an_obstacle_that_is_gone_when_the_reset_arrives_is_none(drive: Drive) -> None:
+    stops = stops_of(drive)
+    stop = await stops.stop("anna", "")
+    drive.obstacle = "the driver holds"
+    asyncio.get_running_loop().call_later(ON_ITS_WAY_S / 2, setattr, drive, "obstacle", "")
+    assert "the stop is reset" in await stops.reset(stop.stop_id)
 
 
 @in_virtual_time
