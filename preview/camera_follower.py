@@ -89,6 +89,9 @@ class CameraFollower:
 
     def delivers(self, camera: str) -> None:
         """Takes the first frame of a camera."""
+        if camera == self._planned:
+            # Given up when it could not be stopped any more, and chosen again: it needs no second start.
+            self._stop_planning()
         self._cameras.delivers(camera, _now())
         self.follow()
 
@@ -125,8 +128,16 @@ class CameraFollower:
             self._retry_timer.start(wait_s)
 
     def _start(self, pipeline: Pipeline, camera: str) -> None:
-        """Plans a camera, and then starts it; counts as being started from now on."""
+        """Plans a camera, and then starts it; counts as being started from now on.
+
+        The one that is being started in the pipeline is given up, unless the live one is lost: it may then be
+        the first to deliver, and the pipeline would end without it.
+        """
         self._stop_planning()
+        if pipeline.starting_camera == camera:
+            return
+        if pipeline.starting_camera is not None and pipeline.live_camera is not None:
+            pipeline.show(None)
         self._planned = camera
         self._planning = asyncio.create_task(self._show(pipeline, camera), name=f"plan of camera {camera}")
 

@@ -296,6 +296,68 @@ async def test_while_a_camera_does_not_answer_requests_count(tmp_path: Path) -> 
         assert cameras_of(actual)["arm"] is CameraState.READY, "the look was given up"
 
 
+@row("a look at a source hangs")
+@in_virtual_time
+async def test_a_camera_that_was_given_up_does_not_take_over_during_the_look_at_another(
+    tmp_path: Path,
+) -> None:
+    preview = Preview(tmp_path, cameras=ROBOT)
+    preview.hung.add("rear")
+    async with preview.serving():
+        preview.supervisor.apply(FRONT)
+        await is_live(preview, "front")
+        preview.supervisor.apply(ARM)
+        await asyncio.sleep(SHOW_S / 2)
+        assert preview.pipelines.built[0].starting_camera == "arm"
+        preview.supervisor.apply(replace(REAR, revision=4))
+        await asyncio.sleep(2 * SHOW_S)
+        assert cameras_of(preview.supervisor.actual()) == {
+            "front": CameraState.LIVE,
+            "rear": CameraState.STARTING,
+            "arm": CameraState.READY,
+        }
+        actual = await preview.until(lambda it: cameras_of(it)["rear"] is CameraState.FAILED)
+        assert cameras_of(actual)["front"] is CameraState.LIVE
+
+
+@row("a look at a source hangs")
+@in_virtual_time
+async def test_a_fallback_on_its_way_goes_on_when_it_is_chosen_again(tmp_path: Path) -> None:
+    """Also during the look at another: with the live camera lost, it is the next one to deliver."""
+    preview = Preview(tmp_path, Script(fault=SOURCE, fault_after_s=5), cameras=ROBOT)
+    preview.hung.add("arm")
+    async with preview.serving():
+        preview.supervisor.apply(FRONT)
+        await is_live(preview, "front")
+        await preview.until(lambda it: cameras_of(it)["rear"] is CameraState.STARTING)
+        lost_at = now()
+        await asyncio.sleep(SHOW_S / 4)
+        preview.supervisor.apply(replace(ARM, revision=4))
+        await asyncio.sleep(SHOW_S / 4)
+        assert preview.pipelines.built[0].starting_camera == "rear"
+        preview.supervisor.apply(replace(REAR, revision=5))
+        await is_live(preview, "rear")
+        assert now() - lost_at == pytest.approx(SHOW_S), "it was not started anew"
+
+
+@in_virtual_time
+async def test_a_camera_that_takes_over_during_a_look_at_it_is_not_started_again(tmp_path: Path) -> None:
+    """It was given up too late, when it was about to take over, and chosen again."""
+    preview = Preview(tmp_path, cameras=ROBOT)
+    preview.hung.add("arm")
+    async with preview.serving():
+        preview.supervisor.apply(FRONT)
+        await is_live(preview, "front")
+        preview.supervisor.apply(ARM)
+        await asyncio.sleep(1)
+        pipeline = preview.pipelines.built[0]
+        pipeline.plan = replace(pipeline.plan, source=replace(pipeline.plan.source, camera="arm"))
+        preview.supervisor.camera_shown("arm")
+        await asyncio.sleep(2 * LOOK_S)
+        actual = preview.supervisor.actual()
+        assert (cameras_of(actual)["arm"], actual.last_error) == (CameraState.LIVE, "")
+
+
 @row("port in use, address not local")
 @in_virtual_time
 async def test_a_port_in_use(tmp_path: Path) -> None:
