@@ -76,6 +76,7 @@ from preview.lifecycle import (
 )
 from preview.pipeline.events import Blame, Fault, PipelineEvents
 from preview.pipeline.plan import Plan, make_plan
+from preview.pipeline.sources import SourcePlan
 from preview.ports import Pipeline, PlanCamera, Recording
 from preview.teardowns import Teardowns
 from preview.values import (
@@ -141,6 +142,9 @@ class Supervisor:
         self._listener_retry = Timer(self._wake.set)
         """Runs while a listener that failed during a recording waits for its retry."""
         self._trials: asyncio.Task[bool] | None = None
+        self._look: asyncio.Task[SourcePlan] | None = None
+        """Plans the camera that the next pipeline starts with."""
+        self._looked_at = ""
         self._closed = False
 
     # --- for the gateway ---
@@ -353,6 +357,20 @@ class Supervisor:
         finally:
             self._trials.cancel()
 
+    async def _look_at(self, camera: str) -> SourcePlan | None:
+        """Plans a camera; None when that was given up, because it is not to be started any more.
+
+        Raises:
+            UserError: it can't be used.
+        """
+        self._looked_at = camera
+        self._look = asyncio.create_task(self._plan_camera(camera), name=f"plan of camera {camera}")
+        try:
+            await asyncio.wait({self._look})
+            return None if self._look.cancelled() else self._look.result()
+        finally:
+            self._look.cancel()
+
     async def _start(self) -> None:
         await self._find_encoder()
         if not self._is_starting():
@@ -364,8 +382,8 @@ class Supervisor:
             return
         camera = self._cameras.first
         try:
-            source = await self._plan_camera(camera)
-            if not self._is_starting():
+            source = await self._look_at(camera)
+            if source is None or not self._is_starting():
                 return
             plan = make_plan(self._settings, self._desired, encoder, choice, source)
             self._report_software_fallback(choice)
@@ -526,6 +544,8 @@ class Supervisor:
             self._move(Event.DISABLE)
         elif new_request:
             self._cameras.follow(new_request=True)
+            if self._look and self._cameras.first != self._looked_at:
+                self._look.cancel()  # The start begins anew, with the other camera.
         self._wake.set()
         self.changes.notify_all()
 
@@ -553,8 +573,10 @@ class Supervisor:
             self._cameras.detach()
         elif before is not State.RUNNING and self._pipeline:
             self._cameras.attach(self._pipeline)
-        if self._trials and event is Event.DISABLE:
-            self._trials.cancel()
+        if event is Event.DISABLE:
+            for awaited in (self._trials, self._look):
+                if awaited:
+                    awaited.cancel()
         if after is not before:
             _log.info("%s -> %s (%s)", before.value, after.value, event.value)
         self._wake.set()

@@ -280,7 +280,8 @@ async def test_while_a_camera_does_not_answer_requests_count(tmp_path: Path) -> 
         preview.supervisor.apply(FRONT)
         await asyncio.sleep(1)
         preview.supervisor.apply(replace(OFF, revision=2))
-        await preview.reaches(State.DISABLED)
+        await preview.until(lambda it: it.pipeline_state is State.DISABLED)
+        assert now() == pytest.approx(1), "the look was given up"
         assert not preview.pipelines.built
         preview.supervisor.apply(replace(REAR, revision=3))
         await is_live(preview, "rear")
@@ -294,6 +295,47 @@ async def test_while_a_camera_does_not_answer_requests_count(tmp_path: Path) -> 
         actual = preview.supervisor.actual()
         assert cameras_of(actual)["front"] is CameraState.LIVE
         assert cameras_of(actual)["arm"] is CameraState.READY, "the look was given up"
+
+
+@row("a look at a source hangs")
+@in_virtual_time
+async def test_instead_of_a_first_camera_that_does_not_answer_another_is_started_at_once(
+    tmp_path: Path,
+) -> None:
+    preview = Preview(tmp_path, cameras=ROBOT)
+    preview.hung.add("front")
+    async with preview.serving():
+        preview.supervisor.apply(FRONT)
+        await asyncio.sleep(1)
+        preview.supervisor.apply(REAR)
+        actual = await is_live(preview, "rear")
+        assert now() == pytest.approx(1 + FIRST_FRAME_S)
+        assert (actual.last_error, actual.counters) == ("", Counters(starts=1))
+
+
+@row("a look at a source hangs")
+@in_virtual_time
+async def test_requests_for_the_same_camera_do_not_prolong_the_look_at_it(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, cameras=ROBOT)
+    preview.hung.add("front")
+    async with preview.serving():
+        preview.supervisor.apply(FRONT)
+        await asyncio.sleep(LOOK_S - 1)
+        preview.supervisor.apply(DesiredState(2, True, Profile.LOW_BW, camera="front"))
+        await is_live(preview, "rear")
+        assert now() == pytest.approx(LOOK_S, abs=3 * FIRST_FRAME_S)
+
+
+@row("a look at a source hangs")
+@in_virtual_time
+async def test_a_stop_does_not_wait_for_a_look(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, cameras=ROBOT)
+    preview.hung.add("front")
+    async with preview.serving():
+        preview.supervisor.apply(FRONT)
+        await asyncio.sleep(1)
+    assert now() == pytest.approx(1)
+    assert preview.supervisor.actual().state is State.DISABLED
 
 
 @row("a look at a source hangs")
