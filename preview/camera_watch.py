@@ -33,7 +33,10 @@ async def watch_cameras(supervisor: Supervisor, settings: PreviewSettings) -> No
         if supervisor.is_watched:
             look = partial(problems, settings, supervisor.unused_cameras)
             try:
-                supervisor.cameras_found(await looks.result(look, LOOK_DEADLINE_S))
+                found = await looks.result(look, LOOK_DEADLINE_S)
+                # A look that hung may have seen a camera, minutes ago, that has come into use since.
+                unused = supervisor.unused_cameras
+                supervisor.cameras_found({name: found[name] for name in found if name in unused})
             except TimeoutError:
                 pause_s = PAUSE_AFTER_HANG_S
             except Exception:  # noqa: BLE001  # what a driver may do is not known; the others are watched on

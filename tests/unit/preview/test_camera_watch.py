@@ -41,6 +41,27 @@ async def test_a_look_that_fails_is_repeated(monkeypatch: pytest.MonkeyPatch) ->
 
 
 @in_virtual_time
+async def test_a_camera_that_came_into_use_during_a_look_is_not_reported(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The defect: a look that had hung for minutes marked a camera as missing that was live by then."""
+    reported = list[dict[str, str]]()
+    supervisor: Any = SimpleNamespace(
+        is_watched=True, unused_cameras=("front", "rear", "arm"), cameras_found=reported.append
+    )
+
+    async def look(*_: object) -> dict[str, str]:
+        supervisor.unused_cameras = ("rear", "arm")
+        return {"front": "no such device", "rear": "no such device", "arm": ""}
+
+    monkeypatch.setattr(SharedCall, "result", look)
+    watching = asyncio.create_task(watch_cameras(supervisor, PreviewSettings()))
+    await asyncio.sleep(LOOK_EVERY_S / 2)
+    watching.cancel()
+    assert reported == [{"rear": "no such device", "arm": ""}]
+
+
+@in_virtual_time
 async def test_a_look_that_hangs_is_the_only_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """The defect: each attempt left one more thread behind, a minute after the last."""
     answers, found = threading.Event(), list[object]()
