@@ -117,10 +117,9 @@ def moving(base: Base, drive: RunningDrive) -> Iterator[None]:
     Raises:
         DisturbedError: the base is at rest already, or the program's worker was lost.
     """
-    worker = drive.worker
-    if not base.moves:
-        raise DisturbedError("the base was at rest already")
-    with same_worker(worker):
+    with same_worker(drive):
+        if not base.moves:
+            raise DisturbedError("the base was at rest already")
         yield
 
 
@@ -135,7 +134,7 @@ def anew_after_a_loss(test: Callable[P, Awaitable[None]]) -> Callable[P, Awaitab
         async def attempt() -> None:
             async with available(robot):
                 pass
-            with same_worker(robot.drive.worker):
+            with same_worker(robot.drive):
                 await test(*args, **fixtures)
 
         await undisturbed_async(attempt)

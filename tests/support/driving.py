@@ -10,7 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -24,6 +24,7 @@ from omniseer.drive.v1 import drive_pb2 as pb
 from tests.support.drive_peer import Instants
 from tests.support.explained import explained_by
 from tests.support.ros import SimulatedRobot, simulated_robot
+from tests.support.running_drive import worker_of
 from tests.support.undisturbed import WORKER_LOST, DisturbedError, same_worker
 from tests.support.waiting import wait_until
 
@@ -110,10 +111,10 @@ class Observer:
         """Returns the newest state; None while the program can't be reached.
 
         Raises:
-            DisturbedError: the worker whose states are wanted was lost.
+            AssertionError: the worker whose states are wanted was lost.
         """
         if self.worker and not self.worker.is_running():
-            raise DisturbedError(WORKER_LOST)
+            raise AssertionError(WORKER_LOST)
         try:
             if self._link is None:
                 self._link = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -321,8 +322,7 @@ class Driving:
     def worker(self) -> psutil.Process:
         """The worker's process."""
         assert self.guard
-        (worker,) = wait_until(psutil.Process(self.guard.pid).children, "a worker")
-        return worker
+        return worker_of(self.guard)
 
     @contextmanager
     def moving(self, *, loses_worker: bool = False) -> Iterator[None]:
@@ -334,13 +334,9 @@ class Driving:
         Raises:
             DisturbedError: the robot is at rest already, or the worker was lost without need.
         """
-        worker = self.worker
-        if not self.witness.moves():
-            raise DisturbedError("the robot was at rest already")
-        if loses_worker:
-            yield
-            return
-        with self._by(worker):
+        with nullcontext() if loses_worker else self.same_worker():
+            if not self.witness.moves():
+                raise DisturbedError("the robot was at rest already")
             yield
 
     @contextmanager
@@ -350,14 +346,8 @@ class Driving:
         Raises:
             DisturbedError: the worker was lost.
         """
-        with self._by(self.worker):
-            yield
-
-    @contextmanager
-    def _by(self, worker: psutil.Process) -> Iterator[None]:
-        self.observer.worker = worker
         try:
-            with same_worker(worker):
+            with same_worker(self) as self.observer.worker:
                 yield
         finally:
             self.observer.worker = None

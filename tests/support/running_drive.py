@@ -41,8 +41,13 @@ class RunningDrive:
     @property
     def worker(self) -> psutil.Process:
         """The worker's process; one that was lost is replaced."""
-        (worker,) = wait_until(psutil.Process(self.process.pid).children, "a worker that drives")
-        return worker
+        return worker_of(self.process)
+
+
+def worker_of(guard: "subprocess.Popen[bytes]") -> psutil.Process:
+    """Waits until a guard has a worker, if need be; returns it."""
+    (worker,) = wait_until(psutil.Process(guard.pid).children, "a worker that drives")
+    return worker
 
 
 @contextmanager

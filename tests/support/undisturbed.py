@@ -3,21 +3,28 @@
 The guard of the drive program replaces a worker that is silent for 60 ms while a driver has the robot, and a
 driver who is late by 250 ms has to hold anew. On a machine that stalls for as long both are right, and end
 what a test is about. A program that does so without need does it again: the test fails when no attempt is
-left.
+left. A worker that ends by itself is no stall: the test fails at once.
 """
 
 import warnings
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
-from typing import Final, NoReturn, TypeVar
+from pathlib import Path
+from typing import Final, NoReturn, Protocol, TypeVar
 
 import psutil
 import pytest
+
+from tests.support.waiting import wait_until
 
 T = TypeVar("T")
 
 ATTEMPTS: Final = 8
 WORKER_LOST: Final = "the worker of the drive program was lost"
+END: Final = "(exit code "
+SILENT: Final = "no heartbeat of the worker for "
+"""What the guard (drive/guard.py) logs of each end of a worker, and of one that it killed for its silence."""
+_LOGGED_WITHIN_S: Final = 5.0
 _ENDS_WITHIN_S: Final = 0.1
 """A process that was killed gives its memory back before it has ended; the zeros may be seen before that."""
 
@@ -26,19 +33,38 @@ class DisturbedError(Exception):
     """Raised by an attempt in which something else has happened than what was to be tested."""
 
 
+class Program(Protocol):
+    """The drive program: tests.support.running_drive, tests.support.driving."""
+
+    @property
+    def worker(self) -> psutil.Process:
+        """The worker's process."""
+
+    @property
+    def log(self) -> Path:
+        """Standard error of guard and worker."""
+
+
 @contextmanager
-def same_worker(worker: psutil.Process) -> Iterator[None]:
-    """A part of an attempt in which a worker has to live; its loss explains whatever fails.
+def same_worker(program: Program) -> Iterator[psutil.Process]:
+    """A part of an attempt in which the worker has to live; its silence explains whatever fails.
+
+    Yields:
+        The worker.
 
     Raises:
-        DisturbedError: the worker was lost.
+        DisturbedError: the guard has killed the worker for its silence.
+        AssertionError: the worker has ended otherwise.
     """
+    # The log first: of an end that is not there yet, the worker may be found for a moment longer.
+    logged_bytes = program.log.stat().st_size
+    worker = program.worker
     try:
-        yield
+        yield worker
     except Exception as error:
-        _check(worker, error)
+        _check(worker, program.log, logged_bytes, error)
         raise
-    _check(worker)
+    _check(worker, program.log, logged_bytes)
 
 
 def undisturbed(attempt: Callable[[], T]) -> T:
@@ -61,12 +87,24 @@ async def undisturbed_async(attempt: Callable[[], Awaitable[T]]) -> T:
     return _give_up()
 
 
-def _check(worker: psutil.Process, cause: Exception | None = None) -> None:
-    if isinstance(cause, DisturbedError):
-        return
+def _check(worker: psutil.Process, log: Path, logged_bytes: int, cause: Exception | None = None) -> None:
     ended, _ = psutil.wait_procs([worker], timeout=_ENDS_WITHIN_S)
-    if ended:
-        raise DisturbedError(WORKER_LOST) from cause
+    if not ended:
+        return
+    try:
+        ends = wait_until(lambda: _ends(log, logged_bytes), "the log has the worker's end", _LOGGED_WITHIN_S)
+    except AssertionError as error:
+        raise error from cause
+    for end in ends:
+        if SILENT not in end:
+            raise AssertionError(f"the worker of the drive program has ended by itself: {end}") from cause
+    raise DisturbedError(WORKER_LOST) from cause
+
+
+def _ends(log: Path, logged_bytes: int) -> list[str]:
+    """Returns what a log has of workers' ends, after its first bytes."""
+    lines = log.read_bytes()[logged_bytes:].decode(errors="replace").splitlines()
+    return [line for line in lines if END in line]
 
 
 def _begin_anew(error: DisturbedError) -> None:

@@ -1,24 +1,44 @@
 """What a stall has spoilt is begun anew, what a defect has is not."""
 
 import subprocess
+import threading
 from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
 
 import psutil
 import pytest
 
 from tests.support.undisturbed import ATTEMPTS, DisturbedError, same_worker, undisturbed, undisturbed_async
 
+SILENT = "no heartbeat of the worker for 61 ms, it waits for a processor: it is killed (exit code -9)"
+CRASHED = "the worker has ended (exit code 1)"
+
+
+@dataclass
+class PlayedProgram:
+    """A drive program whose worker does nothing, and whose guard logs what a test says."""
+
+    worker: psutil.Process
+    log: Path
+
+    def says(self, *lines: str) -> None:
+        with self.log.open("a", encoding="utf-8") as log:
+            log.writelines(f"{line}\n" for line in lines)
+
 
 @pytest.fixture
-def worker() -> Iterator[psutil.Process]:
+def program(tmp_path: Path) -> Iterator[PlayedProgram]:
     with subprocess.Popen(["sleep", "600"]) as process:
-        yield psutil.Process(process.pid)
+        program = PlayedProgram(psutil.Process(process.pid), tmp_path / "drive.log")
+        program.says(CRASHED)  # of another worker, before
+        yield program
         process.kill()
 
 
-def test_what_fails_while_the_worker_lives_has_failed(worker: psutil.Process) -> None:
+def test_what_fails_while_the_worker_lives_has_failed(program: PlayedProgram) -> None:
     def attempt() -> None:
-        with same_worker(worker):
+        with same_worker(program):
             raise AssertionError
 
     with pytest.raises(AssertionError):
@@ -26,7 +46,9 @@ def test_what_fails_while_the_worker_lives_has_failed(worker: psutil.Process) ->
 
 
 @pytest.mark.parametrize("fails", [True, False])
-def test_what_a_lost_worker_has_spoilt_is_begun_anew(worker: psutil.Process, fails: bool) -> None:
+def test_what_a_worker_killed_for_its_silence_has_spoilt_is_begun_anew(
+    program: PlayedProgram, fails: bool
+) -> None:
     attempts = 0
 
     def attempt() -> int:
@@ -34,13 +56,34 @@ def test_what_a_lost_worker_has_spoilt_is_begun_anew(worker: psutil.Process, fai
         attempts += 1
         if attempts > 1:
             return attempts
-        with same_worker(worker):
+        with same_worker(program) as worker:
             worker.kill()
+            # As the guard does: when the process has ended, which a test may notice before.
+            threading.Timer(0.2, program.says, [SILENT]).start()
             assert not fails
         return 0
 
     with pytest.warns(UserWarning, match="the worker of the drive program was lost"):
         assert undisturbed(attempt) == 2
+
+
+@pytest.mark.parametrize("error", [None, AssertionError("it stopped"), DisturbedError("it was at rest")])
+@pytest.mark.parametrize("ends", [[CRASHED], [SILENT, CRASHED]], ids=["one", "the next"])
+def test_a_worker_that_ends_by_itself_fails_the_test(
+    program: PlayedProgram, error: Exception | None, ends: list[str]
+) -> None:
+    def attempt() -> None:
+        with same_worker(program) as worker:
+            worker.kill()
+            program.says(*ends)
+            if error:
+                raise error
+
+    with pytest.raises(
+        AssertionError, match=r"ended by itself: the worker has ended \(exit code 1\)"
+    ) as failed:
+        undisturbed(attempt)
+    assert failed.value.__cause__ is error
 
 
 async def test_what_is_disturbed_again_and_again_fails() -> None:
