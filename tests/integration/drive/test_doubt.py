@@ -19,7 +19,7 @@ from drive.config import DriveSettings
 from omniseer.drive.v1 import drive_pb2 as pb
 from tests.support.drive_peer import Instants
 from tests.support.driving import Driving, driving
-from tests.support.promise import keeps
+from tests.support.promise import MS, keeps
 from tests.support.undisturbed import undisturbed
 from tests.support.waiting import wait_until
 
@@ -60,7 +60,7 @@ def test_blackouts_of_300_ms_do_not_move_the_robot_again_by_themselves(robot: Dr
         return oldest_command_ms(robot, since_ns)
 
     for _ in range(5):
-        keeps(VALID_MS + ON_THE_WAY_MS, "age of a command that moves, ms", blackout)
+        keeps(VALID_MS + ON_THE_WAY_MS, "age of a command that moves, ms", blackout, per_stalled_s=MS)
 
 
 @pytest.mark.parametrize("who", ["gateway", "drive"])
@@ -92,7 +92,7 @@ def test_frozen_and_thawed_again_and_again_nothing_old_moves(robot: Driving, who
         return oldest_command_ms(robot, since_ns)
 
     for _ in range(20):
-        keeps(VALID_MS + ON_THE_WAY_MS, "age of a command that moves, ms", freeze_and_thaw)
+        keeps(VALID_MS + ON_THE_WAY_MS, "age of a command that moves, ms", freeze_and_thaw, per_stalled_s=MS)
 
 
 def test_another_source_of_higher_priority_stops_us(robot: Driving) -> None:
@@ -381,6 +381,6 @@ def test_a_terminal_that_reads_nothing_keeps_no_zero_back(tmp_path: Path, ros_do
                 robot.settled()
             return robot.witness.zero_after_ms(began_ns)
 
-        keeps(1000, "worker frozen, ms", freeze)
+        keeps(1000, "worker frozen, ms", freeze, per_stalled_s=MS)
         robot.close()
     os.close(reader)

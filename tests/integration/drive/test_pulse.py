@@ -15,7 +15,7 @@ import pytest
 from common.ros_node import message_class, ros_node
 from tests.integration.drive.test_commands import findings
 from tests.support.driving import Driving, driving
-from tests.support.promise import keeps
+from tests.support.promise import MS, keeps
 from tests.support.waiting import wait_until
 
 pytestmark = [pytest.mark.ros, pytest.mark.timed]
@@ -128,7 +128,7 @@ def test_a_stop_ends_it(robot: Driving) -> None:
         robot.settled()
         return robot.witness.zero_after_ms(began_ns)
 
-    keeps(50, "stop in a pulse, ms", stop)
+    keeps(50, "stop in a pulse, ms", stop, per_stalled_s=MS)
 
 
 def test_a_driver_ends_it(robot: Driving) -> None:

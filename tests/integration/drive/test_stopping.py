@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pytest
 
 from tests.support.driving import Driving
-from tests.support.promise import keeps
+from tests.support.promise import MS, keeps
 from tests.support.undisturbed import undisturbed
 from tests.support.waiting import wait_until
 
@@ -36,7 +36,7 @@ def test_released(robot: Driving) -> None:
         robot.peer.send(held=False)
         return began_ns
 
-    keeps(60, "released, ms", lambda: zero_after(robot, release))
+    keeps(60, "released, ms", lambda: zero_after(robot, release), per_stalled_s=MS)
 
 
 def test_the_gateway_is_killed(robot: Driving) -> None:
@@ -46,7 +46,7 @@ def test_the_gateway_is_killed(robot: Driving) -> None:
         robot.peer.process.kill()
         return began_ns
 
-    keeps(60, "gateway killed, ms", lambda: zero_after(robot, kill))
+    keeps(60, "gateway killed, ms", lambda: zero_after(robot, kill), per_stalled_s=MS)
     assert robot.state().stop.reason == "the driver was lost while driving: lost"
 
 
@@ -56,7 +56,9 @@ def test_the_gateway_is_frozen(robot: Driving) -> None:
         robot.peer.process.send_signal(signal.SIGSTOP)
         return robot.peer.instants.command_ns
 
-    keeps(280, "gateway frozen, ms after the last command", lambda: zero_after(robot, freeze))
+    keeps(
+        280, "gateway frozen, ms after the last command", lambda: zero_after(robot, freeze), per_stalled_s=MS
+    )
 
 
 def test_the_gateway_is_silent(robot: Driving) -> None:
@@ -66,7 +68,12 @@ def test_the_gateway_is_silent(robot: Driving) -> None:
         robot.inhibited()
         return robot.peer.instants.command_ns
 
-    keeps(280, "gateway silent, ms after the last command", lambda: zero_after(robot, fall_silent))
+    keeps(
+        280,
+        "gateway silent, ms after the last command",
+        lambda: zero_after(robot, fall_silent),
+        per_stalled_s=MS,
+    )
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "frozen"])
@@ -77,7 +84,9 @@ def test_the_worker_is_lost(robot: Driving, number: signal.Signals) -> None:
         os.kill(pid, number)
         return began_ns
 
-    keeps(150, f"worker {number.name}, ms", lambda: zero_after(robot, lose, loses_worker=True))
+    keeps(
+        150, f"worker {number.name}, ms", lambda: zero_after(robot, lose, loses_worker=True), per_stalled_s=MS
+    )
     assert wait_until(lambda: robot.state().stop.by, "a latched stop", 30) == "robot-drive"
 
 
@@ -88,7 +97,12 @@ def test_a_stop(robot: Driving) -> None:
         robot.peer.send(stop="ben")
         return began_ns
 
-    keeps(50, "stop, ms", lambda: max(undisturbed(lambda: zero_after(robot, stop)) for _ in range(10)))
+    keeps(
+        50,
+        "stop, ms",
+        lambda: max(undisturbed(lambda: zero_after(robot, stop)) for _ in range(10)),
+        per_stalled_s=MS,
+    )
 
 
 def test_the_picture_grows_old(robot: Driving) -> None:
@@ -98,7 +112,12 @@ def test_the_picture_grows_old(robot: Driving) -> None:
         robot.inhibited()
         return robot.peer.instants.picture_ns
 
-    keeps(650, "picture frozen, ms after its capture", lambda: zero_after(robot, freeze_picture))
+    keeps(
+        650,
+        "picture frozen, ms after its capture",
+        lambda: zero_after(robot, freeze_picture),
+        per_stalled_s=MS,
+    )
 
 
 def test_only_the_downlink_is_dead(robot: Driving) -> None:
@@ -108,7 +127,12 @@ def test_only_the_downlink_is_dead(robot: Driving) -> None:
         robot.inhibited()
         return robot.peer.instants.echo_ns
 
-    keeps(450, "downlink dead, ms after the newest echo", lambda: zero_after(robot, freeze_echo))
+    keeps(
+        450,
+        "downlink dead, ms after the newest echo",
+        lambda: zero_after(robot, freeze_echo),
+        per_stalled_s=MS,
+    )
 
 
 def test_the_guard_is_killed(robot: Driving) -> None:
@@ -119,7 +143,7 @@ def test_the_guard_is_killed(robot: Driving) -> None:
         robot.guard.wait()
         return began_ns
 
-    keeps(150, "guard killed, ms", lambda: zero_after(robot, kill, loses_worker=True))
+    keeps(150, "guard killed, ms", lambda: zero_after(robot, kill, loses_worker=True), per_stalled_s=MS)
     wait_until(lambda: robot.observer.state() is None, "the worker has ended")
     robot.start()
     assert robot.state().stop.by == "robot-drive", "the next start finds a stop"
@@ -140,7 +164,7 @@ def test_the_guard_is_frozen(robot: Driving) -> None:
             robot.guard.kill()
             robot.guard.wait()
 
-    keeps(1500, "guard frozen, ms", judged)
+    keeps(1500, "guard frozen, ms", judged, per_stalled_s=MS)
 
 
 def test_both_are_killed_and_only_the_base_stops(robot: Driving) -> None:

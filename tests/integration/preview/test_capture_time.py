@@ -24,7 +24,7 @@ from tests.support.film import clip
 from tests.support.judges import complaints, decoded_frames, stamps
 from tests.support.mpegts import CLOCK_LIMIT_MS, Stream, analyse
 from tests.support.pipeline_contract import LIVE, Events, plan_of
-from tests.support.promise import keeps
+from tests.support.promise import MS, keeps
 from tests.support.recording import record
 from tests.support.running_preview import RunningPreview
 from tests.support.waiting import wait_until
@@ -103,7 +103,7 @@ def is_true(preview: RunningPreview, directory: Path, what: str) -> None:
         assert min(found) > -WITHIN_MS, "captured before its stamp"
         return soonest
 
-    keeps(WITHIN_MS, f"ms after the stamp, {what}", error_ms)
+    keeps(WITHIN_MS, f"ms after the stamp, {what}", error_ms, per_stalled_s=MS)
 
 
 @pytest.mark.timed
@@ -199,7 +199,7 @@ def plausible(preview: RunningPreview) -> None:
         assert min(ages) > -1, "no frame comes before its capture"
         return statistics.median(ages)
 
-    keeps(PLAUSIBLE_MS, "ms from capture to arrival", typical_ms)
+    keeps(PLAUSIBLE_MS, "ms from capture to arrival", typical_ms, per_stalled_s=MS)
 
 
 class _Later:

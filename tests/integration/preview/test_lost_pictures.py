@@ -16,7 +16,7 @@ from common.gst import Gst
 from console.client import GatewayClient
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from tests.support.mpegts import PACKET_BYTES, AccessUnit, analyse
-from tests.support.promise import keeps_async
+from tests.support.promise import MS, keeps_async
 from tests.support.recording import record
 from tests.support.running_gateway import running_gateway
 from tests.support.running_preview import RunningPreview
@@ -93,7 +93,9 @@ async def test_a_key_frame_arrives_in_time(preview: RunningPreview) -> None:
     async with running_gateway(preview.socket) as operator:
         await operator.switch(True)
         arrivals = Arrivals(preview.port)
-        await keeps_async(KEY_FRAME_WITHIN_MS, "ms to a key frame", partial(asyncio.to_thread, worst_ms))
+        await keeps_async(
+            KEY_FRAME_WITHIN_MS, "ms to a key frame", partial(asyncio.to_thread, worst_ms), per_stalled_s=MS
+        )
 
 
 def test_a_key_frame_that_is_on_its_way_serves_a_loss(preview: RunningPreview) -> None:

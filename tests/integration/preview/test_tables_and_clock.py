@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from omniseer.preview.v1 import preview_service_pb2 as pb
-from tests.support.mpegts import Stream, analyse, share_beyond, share_of_the_limits
-from tests.support.promise import keeps
+from tests.support.mpegts import CLOCK_LIMIT_MS, Stream, analyse, share_beyond, share_of_the_limits
+from tests.support.promise import MS, keeps
 from tests.support.recording import record
 from tests.support.running_preview import RunningPreview
 
@@ -35,7 +35,12 @@ def test_at_rates_of_ones_own(tmp_path: Path, fps: int) -> None:
             in_order(stream)
             return share_of_the_limits(stream)
 
-        keeps(1.0, "longest distance of clocks and tables, of its limit", of_its_limit)
+        keeps(
+            1.0,
+            "longest distance of clocks and tables, of its limit",
+            of_its_limit,
+            per_stalled_s=MS / CLOCK_LIMIT_MS,
+        )
 
 
 def test_while_the_profile_changes(preview: RunningPreview) -> None:

@@ -12,6 +12,8 @@ from tests.support import promise
 from tests.support.promise import (
     ATTEMPTS,
     LOADED_FROM,
+    MS,
+    SPOILT_FROM_S,
     STALLED_FROM_S,
     STOLEN_FROM_S,
     keeps,
@@ -96,19 +98,38 @@ def test_what_the_host_takes_is_no_fault_of_the_product(
         assert keeps(2.0, "s", lambda: next(figures)) == 1.5
 
 
-@pytest.mark.parametrize(("stalled_s", "judged"), [(0.02, True), (STALLED_FROM_S, False)])
+@pytest.mark.parametrize(
+    ("late", "per_stalled_s", "stalled_s"),
+    [(0.02, 1.0, STALLED_FROM_S), (0.19, 1.0, 0.2), (29.0, MS, 0.03), (1.0, None, SPOILT_FROM_S)],
+    ids=["s", "s, longer", "ms", "a count"],
+)
 def test_what_a_stall_of_the_machine_has_made_late_is_measured_again(
-    attempts: Attempts, stalled_s: float, judged: bool
+    attempts: Attempts, late: float, per_stalled_s: float | None, stalled_s: float
 ) -> None:
     attempts.loads += [FREE, FREE]
     attempts.stalled_s += [stalled_s]
-    figures = iter([9.0, 1.5])
-    if judged:
-        with pytest.raises(pytest.fail.Exception, match="promised 2"):
-            keeps(2.0, "s", lambda: next(figures))
-        return
-    with pytest.warns(UserWarning, match="not judged: .* stood still for 0.030 s"):
-        assert keeps(2.0, "s", lambda: next(figures)) == 1.5
+    figures = iter([2.0 + late, 1.5])
+    with pytest.warns(UserWarning, match=f"not judged: .* stood still for {stalled_s:.3f} s"):
+        assert keeps(2.0, "it", lambda: next(figures), per_stalled_s=per_stalled_s) == 1.5
+
+
+@pytest.mark.parametrize(
+    ("late", "per_stalled_s", "stalled_s"),
+    [(0.02, 1.0, 0.025), (1.5, 1.0, 0.1), (110.0, MS, 0.1), (1.0, None, 0.19)],
+    ids=["too short to tell", "s", "ms", "a count"],
+)
+async def test_a_stall_that_is_too_short_for_what_is_late_is_no_excuse(
+    attempts: Attempts, late: float, per_stalled_s: float | None, stalled_s: float
+) -> None:
+    async def measure() -> float:
+        return 2.0 + late
+
+    attempts.loads += [FREE, FREE]
+    attempts.stalled_s += [stalled_s] * 2
+    with pytest.raises(pytest.fail.Exception, match="promised 2"):
+        keeps(2.0, "it", lambda: 2.0 + late, per_stalled_s=per_stalled_s)
+    with pytest.raises(pytest.fail.Exception, match="promised 2"):
+        await keeps_async(2.0, "it", measure, per_stalled_s=per_stalled_s)
 
 
 def test_a_process_that_stands_still_is_noticed() -> None:

@@ -15,7 +15,7 @@ from console.window.monitor_window import MonitorWindow
 from console.window.programs import monitor, reading_gamepad
 from tests.support.driven_robot import DrivenRobot, available, driven_robot, moving
 from tests.support.lost_worker import reset_after_a_loss
-from tests.support.promise import keeps
+from tests.support.promise import MS, keeps
 from tests.support.qt import let_pass, until
 from tests.support.virtual_pad import VirtualPad, virtual_pad
 
@@ -116,7 +116,7 @@ def test_a_key_is_released(seat: Seat) -> None:
         seat.begins(seat.presses, seat.lets_go)
         return seat.stopped_after_ms(seat.lets_go)
 
-    keeps(LET_GO_MS, "ms from the release of a key to zero", measure)
+    keeps(LET_GO_MS, "ms from the release of a key to zero", measure, per_stalled_s=MS)
 
 
 def test_the_window_loses_the_focus(seat: Seat) -> None:
@@ -128,7 +128,7 @@ def test_the_window_loses_the_focus(seat: Seat) -> None:
         seat.lets_go()
         return found_ms
 
-    keeps(LET_GO_MS, "ms from the loss of the focus to zero", measure)
+    keeps(LET_GO_MS, "ms from the loss of the focus to zero", measure, per_stalled_s=MS)
 
 
 def test_the_gamepads_shoulder_is_released(seat: Seat) -> None:
@@ -136,7 +136,7 @@ def test_the_gamepads_shoulder_is_released(seat: Seat) -> None:
         seat.begins(seat.holds_the_pad, seat.lets_the_pad_go)
         return seat.stopped_after_ms(seat.lets_the_pad_go)
 
-    keeps(LET_GO_MS, "ms from the release of the shoulder button to zero", measure)
+    keeps(LET_GO_MS, "ms from the release of the shoulder button to zero", measure, per_stalled_s=MS)
 
 
 def test_the_gamepad_is_unplugged(seat: Seat) -> None:
@@ -145,4 +145,4 @@ def test_the_gamepad_is_unplugged(seat: Seat) -> None:
         seat.begins(seat.holds_the_pad, seat.lets_the_pad_go)
         return seat.stopped_after_ms(seat.pad.unplug)
 
-    keeps(LET_GO_MS, "ms from the end of the gamepad to zero", measure)
+    keeps(LET_GO_MS, "ms from the end of the gamepad to zero", measure, per_stalled_s=MS)

@@ -18,7 +18,7 @@ from console.receiver.delivery import DeliveryChoice
 from console.receiver.frame import Frame, PixelFormat
 from console.viewer.headless import watch_headless
 from console.viewer.robot_video import RobotVideo
-from tests.support.promise import keeps
+from tests.support.promise import MS, keeps
 from tests.support.udp_link import Impairment, UdpLink
 from tests.support.video_ground import VideoGround, video_ground
 from tests.support.waiting import wait_until
@@ -92,7 +92,7 @@ def test_the_age_is_true(tmp_path: Path, stamping: Camera) -> None:
             print(f"{found[0]:.2f} to {found[-1]:.2f} ms, {statistics.median(found):.2f} ms in the middle")
             return statistics.median(found)
 
-        keeps(ERROR_MS, "ms between the age that is shown and that of the stamp", error_ms)
+        keeps(ERROR_MS, "ms between the age that is shown and that of the stamp", error_ms, per_stalled_s=MS)
         bound = robot.meter.reading()
         assert bound.error_ms is not None
         assert bound.error_ms < 20
@@ -178,7 +178,9 @@ def test_a_picture_is_torn_for_a_round_trip_and_a_key_frame(
             print(", ".join(f"{one:.0f}" for one in found), "ms")
             return statistics.median(found)
 
-        keeps(RTT_MS + KEY_FRAME_MS, "ms from a lost packet to the next whole frame", torn_ms)
+        keeps(
+            RTT_MS + KEY_FRAME_MS, "ms from a lost packet to the next whole frame", torn_ms, per_stalled_s=MS
+        )
         assert not any(frame.corrupt for frame in seen)
 
 

@@ -71,7 +71,12 @@ async def test_a_step_of_an_hour_does_not_stop_the_robot(robot: DrivenRobot, clo
                         assert stamp_s - time.time() == pytest.approx(step_s, abs=10), "the step is in force"
         return len(phases - {DrivePhase.DRIVING})
 
-    await keeps_async(0, "phases beside driving while the calendar clock was stepped", stops_without_need)
+    await keeps_async(
+        0,
+        "phases beside driving while the calendar clock was stepped",
+        stops_without_need,
+        per_stalled_s=None,
+    )
 
 
 @pytest.mark.parametrize("step_s", [HOUR_S, -HOUR_S])

@@ -24,7 +24,7 @@ from tests.support.driven_robot import DrivenRobot, driven_robot, in_motion, is_
 from tests.support.driver_view import Viewer, by_picture, young_picture
 from tests.support.eventually import eventually
 from tests.support.explained import explained_by
-from tests.support.promise import keeps_async
+from tests.support.promise import MS, keeps_async
 from tests.support.running_preview import RunningPreview
 from tests.support.stalling_camera import StallingCamera
 
@@ -132,7 +132,9 @@ async def test_a_picture_without_a_successor_stops_the_robot_in_time(scene: Scen
             await eventually(lambda: is_at_rest(scene.robot.base), bool, "the last message is zero")
             return scene.robot.base.stopped_after_s(viewer.shown_ns / 1e9) * 1000
 
-    await keeps_async(PROMISED_MS, f"{fault}, ms after the capture of the last picture", zero_after_ms)
+    await keeps_async(
+        PROMISED_MS, f"{fault}, ms after the capture of the last picture", zero_after_ms, per_stalled_s=MS
+    )
 
 
 @pytest.mark.parametrize("camera", ["running", "silent"])
