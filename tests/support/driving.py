@@ -364,8 +364,9 @@ class Driving:
         if self.peer:
             self.peer.close()
         if self.guard:
-            with suppress(psutil.NoSuchProcess, IndexError):
-                self.worker.resume()
+            with suppress(psutil.NoSuchProcess):
+                for worker in psutil.Process(self.guard.pid).children():
+                    worker.resume()
             self.guard.send_signal(signal.SIGCONT)
             end(self.guard)
 

@@ -181,9 +181,11 @@ def test_two_hundred_come_and_go_within_one_stream(preview: RunningPreview) -> N
         assert watcher.longest_pause_s < LONGEST_PAUSE_S
         viewers(preview, 1)
         wait_until(lambda: preview.descriptors() <= descriptors, "as many descriptors as before")
-        grown_mib = preview.resident_mib() - resident
-        assert grown_mib < 40, "150 MiB, were every connection kept"
-        print(f"200 visits: {grown_mib:.1f} MiB more, pause of another {watcher.longest_pause_s:.2f} s")
+        # The faster they come, the more of them SRT still keeps.
+        wait_until(
+            lambda: preview.resident_mib() - resident < 40, "little more memory; 150 MiB, were all kept"
+        )
+        print(f"200 visits: pause of another {watcher.longest_pause_s:.2f} s")
     assert preview.running().counters == pb.Counters(starts=1)
     preview.disable()
     preview.disabled()
