@@ -42,7 +42,8 @@ def run_pulse(settings: DriveSettings, doctor: socket.socket) -> None:
     """
     with ros_node(OwnNode.DRIVE_PULSE) as node, closing(Permission(node, settings)) as permission:
         facts = _Pulse(node, settings, permission, doctor).run()
-    doctor.send(json.dumps(asdict(facts)).encode())
+        # Before the node leaves the graph, which takes longer than the doctor waits for a heartbeat.
+        doctor.send(json.dumps(asdict(facts)).encode())
 
 
 class _Pulse:

@@ -8,7 +8,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,7 +23,13 @@ _START_S: Final = 20.0
 """From the start of the process to its first heartbeat; imports and the discovery of ROS take seconds."""
 _SILENT_S: Final = 0.25
 """Twelve steps of the pulse, which has no real-time priority; at its speed that is a centimetre."""
+_END_S: Final = 5.0
+"""For a pulse that has reported, and has said zero before that, to leave the graph."""
 _MAX_BYTES: Final = 4096
+
+
+class _LostError(Exception):
+    """The pulse does not go on; its text says what it did."""
 
 
 def guarded_pulse(node: Any, settings: DriveSettings, config_file: Path | None) -> PulseFacts:
@@ -52,7 +58,13 @@ def guarded_pulse(node: Any, settings: DriveSettings, config_file: Path | None) 
                 process_group=0,
             )
         try:
-            return _followed(ours)
+            facts = _followed(ours)
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(_END_S)
+        except _LostError as lost:
+            return PulseFacts(PULSE_MPS, None, None, f"was ended early: {lost}")
+        else:
+            return facts
         finally:
             with _undisturbed():
                 # First the kill, then the zeros: a process that thaws must not have the last word.
@@ -63,22 +75,22 @@ def guarded_pulse(node: Any, settings: DriveSettings, config_file: Path | None) 
 
 
 def _followed(pulse: socket.socket) -> PulseFacts:
-    """Reads heartbeats until the result comes, or the pulse has to be killed."""
+    """Reads heartbeats until the result comes.
+
+    Raises:
+        _LostError: the pulse has to be killed.
+    """
     patience_s = _START_S
     while True:
         ready, _, _ = select.select([pulse], [], [], patience_s)
         if not ready:
-            return _lost(f"its process was silent for {patience_s * 1000:.0f} ms")
+            raise _LostError(f"its process was silent for {patience_s * 1000:.0f} ms")
         packet = pulse.recv(_MAX_BYTES)
         if not packet:
-            return _lost("its process has ended")
+            raise _LostError("its process has ended")
         if packet != BEAT:
             return PulseFacts(**json.loads(packet))
         patience_s = _SILENT_S
-
-
-def _lost(reason: str) -> PulseFacts:
-    return PulseFacts(PULSE_MPS, None, None, f"was ended early: {reason}")
 
 
 @contextmanager
