@@ -1,9 +1,9 @@
 """Token and certificates of a client, and the certificate authority of the robot. Knows no gRPC."""
 
-import ipaddress
 from dataclasses import dataclass, field
 from typing import Final
 
+from common.addresses import is_loopback
 from common.errors import ExitCode, UserError
 
 _TOKEN_HEADER: Final = "authorization"  # noqa: S105  # a name
@@ -47,21 +47,11 @@ class Credentials:
                 "Store this robot's login: robotctl login NAME HOST:PORT FILE",
                 exit_code=ExitCode.USAGE,
             )
-        if self.token is not None and not _is_loopback(target):
+        if self.token is not None and not is_loopback(target.rpartition(":")[0]):
             raise UserError(
                 f"the token would be sent to {target} in the clear",
                 "Store the robot's login (robotctl login NAME HOST:PORT FILE), which has its CA certificate, "
                 "or use a tunnel to 127.0.0.1",
                 exit_code=ExitCode.USAGE,
             )
-        return False
-
-
-def _is_loopback(target: str) -> bool:
-    host = target.rpartition(":")[0].strip("[]")
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
         return False

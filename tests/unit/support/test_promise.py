@@ -116,7 +116,7 @@ def test_what_a_stall_of_the_machine_has_made_late_is_measured_again(
 @pytest.mark.parametrize(
     ("late", "per_stalled_s", "stalled_s"),
     [(0.02, 1.0, 0.025), (1.5, 1.0, 0.1), (110.0, MS, 0.1), (1.0, None, 0.19)],
-    ids=["too short to tell", "s", "ms", "a count"],
+    ids=["too short to explain", "s", "ms", "a count"],
 )
 async def test_a_stall_that_is_too_short_for_what_is_late_is_no_excuse(
     attempts: Attempts, late: float, per_stalled_s: float | None, stalled_s: float

@@ -3,6 +3,7 @@
 import os
 import signal
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -35,6 +36,12 @@ def becomes(session: VideoSession, state: PlaybackState) -> float:
     """Waits for a state and returns when it was seen."""
     wait_until(lambda: session.playback().state is state, f"{state}; it is {session.playback()}", 25)
     return time.monotonic()
+
+
+def keeps_its_limits(of_its_limit: Callable[[], float]) -> None:
+    """Judges how soon a freeze shows and is over; `of_its_limit` returns the larger share of its limit."""
+    what = "time until a freeze shows, or is over, of its limit"
+    keeps(1.0, what, of_its_limit, per_stalled_s=1 / FREEZE_SHOWN_WITHIN_S)
 
 
 def test_it_follows_the_preview_from_off_to_on_and_back(ground: VideoGround, session: VideoSession) -> None:
@@ -75,12 +82,7 @@ def test_a_killed_preview_is_a_freeze_at_once_and_back_at_once(
         return max(frozen_s / FREEZE_SHOWN_WITHIN_S, back_s / BACK_WITHIN_S)
 
     ground.switch_on()
-    keeps(
-        1.0,
-        "time until a freeze shows, or is over, of its limit",
-        of_its_limit,
-        per_stalled_s=1 / FREEZE_SHOWN_WITHIN_S,
-    )
+    keeps_its_limits(of_its_limit)
 
 
 @pytest.mark.timed
@@ -104,12 +106,7 @@ def test_a_preview_that_stands_still_is_a_freeze_and_goes_on(
         return max(frozen_s / FREEZE_SHOWN_WITHIN_S, back_s / BACK_WITHIN_S)
 
     ground.switch_on()
-    keeps(
-        1.0,
-        "time until a freeze shows, or is over, of its limit",
-        of_its_limit,
-        per_stalled_s=1 / FREEZE_SHOWN_WITHIN_S,
-    )
+    keeps_its_limits(of_its_limit)
 
 
 def test_frames_go_on_without_the_gateway(ground: VideoGround, session: VideoSession) -> None:
