@@ -11,7 +11,7 @@ from typing import Final, NoReturn, Self
 
 import pytest
 
-from tests.support.stalls import Stalls
+from tests.support.stalls import SPOILT_FROM_S, Stalls
 from tests.support.undisturbed import undisturbed, undisturbed_async
 
 _PRESSURE: Final = Path("/proc/pressure/cpu")
@@ -26,8 +26,6 @@ holds: two ticks of the kernel's count."""
 STALLED_FROM_S: Final = 0.03
 """For how long this process did not run, from which on that may explain a late figure: hosts stall machines
 for 50 to 200 ms now and then, and not all of them say so."""
-SPOILT_FROM_S: Final = 0.2
-"""The same, for a figure that does not grow with it: a driver is late then, and the robot stops."""
 MS: Final = 1000.0
 """Per second, of a figure in milliseconds."""
 ATTEMPTS: Final = 4

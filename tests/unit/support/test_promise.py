@@ -2,6 +2,9 @@
 
 import asyncio
 import ctypes
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
@@ -13,15 +16,26 @@ from tests.support.promise import (
     ATTEMPTS,
     LOADED_FROM,
     MS,
-    SPOILT_FROM_S,
     STALLED_FROM_S,
     STOLEN_FROM_S,
     keeps,
     keeps_async,
 )
-from tests.support.stalls import Stalls
+from tests.support.stalls import SPOILT_FROM_S, Stalls
 
 FREE, LOADED = LOADED_FROM - 0.01, LOADED_FROM + 0.01
+NOT_PERMITTED = 77
+TAKES_A_PROCESSOR = f"""
+import os, sys, time
+os.sched_setaffinity(0, {{int(sys.argv[1])}})
+try:
+    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+except PermissionError:
+    sys.exit({NOT_PERMITTED})
+until_s = time.monotonic() + 0.15
+while time.monotonic() < until_s:
+    pass
+"""
 
 
 @dataclass
@@ -135,6 +149,18 @@ async def test_a_stall_that_is_too_short_for_what_is_late_is_no_excuse(
 def test_a_process_that_stands_still_is_noticed() -> None:
     with Stalls() as stalls:
         ctypes.PyDLL(None).usleep(150_000)  # of a library for Python's own functions: no other thread runs
+    assert stalls.longest_s > 0.1
+
+
+@pytest.mark.parametrize("processor", sorted(os.sched_getaffinity(0)))
+def test_a_processor_that_stands_still_is_noticed(processor: int) -> None:
+    with Stalls() as stalls:
+        done = subprocess.run(
+            [sys.executable, "-c", TAKES_A_PROCESSOR, str(processor)], timeout=60, check=False
+        )
+    if done.returncode == NOT_PERMITTED:
+        pytest.skip("only root, and who may use real-time priorities, can take a processor")
+    assert done.returncode == 0
     assert stalls.longest_s > 0.1
 
 
