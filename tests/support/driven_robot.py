@@ -25,7 +25,13 @@ from tests.support.heard import Base
 from tests.support.lost_worker import RESET_WITHIN_S, ready_after_a_loss
 from tests.support.ros import simulated_robot
 from tests.support.running_drive import RunningDrive, listening_base, running_drive
-from tests.support.undisturbed import DisturbedError, same_worker, undisturbed_async
+from tests.support.undisturbed import (
+    DisturbedError,
+    no_stall,
+    same_worker,
+    undisturbed,
+    undisturbed_async,
+)
 from tests.support.waiting import wait_until
 
 P = ParamSpec("P")
@@ -140,6 +146,21 @@ def anew_after_a_loss(test: Callable[P, Awaitable[None]]) -> Callable[P, Awaitab
         await undisturbed_async(attempt)
 
     return begun_anew
+
+
+def drives_undisturbed(robot: DrivenRobot, attempt: Callable[[], None]) -> None:
+    """Makes attempts with a robot that is free, until no stall has cost the driver the robot."""
+
+    async def free() -> None:
+        async with available(robot):
+            pass
+
+    def begun() -> None:
+        asyncio.run(free())
+        with same_worker(robot.drive), no_stall():
+            attempt()
+
+    undisturbed(begun)
 
 
 async def in_motion(client: AsyncGatewayClient, session: DriveSession, base: Base, speed_mps: float) -> None:

@@ -15,6 +15,7 @@ from typing import Final, NoReturn, Protocol, TypeVar
 import psutil
 import pytest
 
+from tests.support.stalls import SPOILT_FROM_S, Stalls
 from tests.support.waiting import wait_until
 
 T = TypeVar("T")
@@ -65,6 +66,22 @@ def same_worker(program: Program) -> Iterator[psutil.Process]:
         _check(worker, program.log, logged_bytes, error)
         raise
     _check(worker, program.log, logged_bytes)
+
+
+@contextmanager
+def no_stall() -> Iterator[None]:
+    """A part of an attempt in which a stall explains what fails: a driver who is late.
+
+    Raises:
+        DisturbedError: it has failed, and there was one.
+    """
+    with Stalls() as stalls:
+        try:
+            yield
+        except AssertionError as error:
+            if stalls.longest_s < SPOILT_FROM_S:
+                raise
+            raise DisturbedError(f"the machine stood still for {stalls.longest_s:.3f} s") from error
 
 
 def undisturbed(attempt: Callable[[], T]) -> T:

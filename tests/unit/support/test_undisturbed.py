@@ -3,13 +3,22 @@
 import subprocess
 import threading
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
 import pytest
 
-from tests.support.undisturbed import ATTEMPTS, DisturbedError, same_worker, undisturbed, undisturbed_async
+from tests.support.stalls import SPOILT_FROM_S
+from tests.support.undisturbed import (
+    ATTEMPTS,
+    DisturbedError,
+    no_stall,
+    same_worker,
+    undisturbed,
+    undisturbed_async,
+)
 
 SILENT = "no heartbeat of the worker for 61 ms, it waits for a processor: it is killed (exit code -9)"
 CRASHED = "the worker has ended (exit code 1)"
@@ -100,3 +109,31 @@ async def test_what_is_disturbed_again_and_again_fails() -> None:
     ):
         await undisturbed_async(attempt)
     assert attempts == ATTEMPTS
+
+
+class PlayedStalls(AbstractContextManager["PlayedStalls"]):
+    longest_s = 0.0
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+
+@pytest.fixture
+def stalls(monkeypatch: pytest.MonkeyPatch) -> PlayedStalls:
+    played = PlayedStalls()
+    monkeypatch.setattr("tests.support.undisturbed.Stalls", lambda: played)
+    return played
+
+
+def test_what_fails_in_a_stall_is_begun_anew(stalls: PlayedStalls) -> None:
+    stalls.longest_s = SPOILT_FROM_S
+    with pytest.raises(DisturbedError, match="stood still"), no_stall():
+        raise AssertionError
+    with no_stall():
+        pass
+
+
+def test_what_fails_without_a_stall_has_failed(stalls: PlayedStalls) -> None:
+    stalls.longest_s = SPOILT_FROM_S - 0.001
+    with pytest.raises(AssertionError), no_stall():
+        raise AssertionError

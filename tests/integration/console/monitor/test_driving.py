@@ -1,9 +1,11 @@
 """Driving in the cockpit: a real gateway and drive program, and a base that listens."""
 
+import functools
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
+from typing import ParamSpec
 
 import pytest
 from PySide6.QtCore import QEvent, QPoint, Qt
@@ -15,11 +17,12 @@ from console.client import Supervision
 from console.steering import Steering
 from console.window.monitor_window import MonitorWindow
 from console.window.programs import monitor
-from tests.support.driven_robot import DrivenRobot, driven_robot
+from tests.support.driven_robot import DrivenRobot, driven_robot, drives_undisturbed
 from tests.support.qt import keep_screenshot, let_pass, press, until
-from tests.support.robotctl import robotctl
 
 pytestmark = [pytest.mark.ros, pytest.mark.gst]
+
+P = ParamSpec("P")
 
 BY_EYE = Supervision.LINE_OF_SIGHT
 BY_EYE_MPS = 0.15
@@ -64,10 +67,26 @@ class PlayedPad:
 
 @dataclass
 class Seat:
-    """A driver in front of the window."""
+    """A driver in front of a window, for as long as `taken` lasts."""
 
-    window: MonitorWindow
     robot: DrivenRobot
+    _window: MonitorWindow | None = None
+
+    @property
+    def window(self) -> MonitorWindow:
+        assert self._window
+        return self._window
+
+    @contextmanager
+    def taken(self) -> Iterator[None]:
+        """Opens a window; the robot is at rest and free when it is closed again."""
+        with monitor(self.robot.target) as self._window:
+            self.window.activateWindow()
+            until(self.window.isActiveWindow, "the window is active")
+            until(self.window.strip.driving.isVisible, "the place of driving")
+            yield
+        until(lambda: not self.robot.base.moves, "a closed window drives nothing")
+        until(lambda: not self.robot.teleop.holder, "nor keeps it the robot")
 
     def ready(self) -> None:
         """Takes the robot; the next hold moves it."""
@@ -102,20 +121,30 @@ class Seat:
 
 
 @pytest.fixture
-def seat(robot: DrivenRobot) -> Iterator[Seat]:
-    if robot.teleop.HasField("stop"):
-        robotctl("reset-stop", str(robot.teleop.stop.stop_id), "--target", robot.target)
-    with monitor(robot.target) as window:
-        window.activateWindow()
-        until(window.isActiveWindow, "the window is active")
-        until(window.strip.driving.isVisible, "the place of driving")
-        yield Seat(window, robot)
-    until(lambda: not robot.base.moves, "a closed window drives nothing")
-    until(lambda: not robot.teleop.holder, "nor keeps it the robot")
+def seat(robot: DrivenRobot) -> Seat:
+    return Seat(robot)
+
+
+def seated(test: Callable[P, None]) -> Callable[P, None]:
+    """A test in a seat that is taken; begun anew where a stall has cost the driver the robot."""
+
+    @functools.wraps(test)
+    def begun_anew(*args: P.args, **fixtures: P.kwargs) -> None:
+        seat = fixtures["seat"]
+        assert isinstance(seat, Seat)
+
+        def attempt() -> None:
+            with seat.taken():
+                test(*args, **fixtures)
+
+        drives_undisturbed(seat.robot, attempt)
+
+    return begun_anew
 
 
 # The base must still move a moment later: where its driver is late by 250 ms, the robot stops.
 @pytest.mark.timed
+@seated
 def test_a_key_moves_the_robot_while_it_is_down(seat: Seat) -> None:
     seat.ready()
     seat.key(Qt.Key.Key_W, down=True)
@@ -152,6 +181,7 @@ MEANINGS = [
 
 
 @pytest.mark.parametrize(("pressed", "with_", "released", "then_with"), MEANINGS)
+@seated
 def test_a_key_whose_meaning_has_changed_is_released(
     seat: Seat,
     pressed: Qt.Key,
@@ -174,6 +204,7 @@ def test_a_key_whose_meaning_has_changed_is_released(
 
 # The base must still move a moment later: where its driver is late by 250 ms, the robot stops.
 @pytest.mark.timed
+@seated
 def test_another_key_that_goes_up_releases_none(seat: Seat) -> None:
     seat.ready()
     target = QApplication.focusWidget() or seat.window
@@ -189,6 +220,7 @@ def test_another_key_that_goes_up_releases_none(seat: Seat) -> None:
 
 
 @pytest.mark.parametrize("modifiers", [SHIFT, CONTROL, ALT, META, KEYPAD, ALT_GR, SHIFT | CONTROL])
+@seated
 def test_space_stops_whatever_else_is_down(seat: Seat, modifiers: Qt.KeyboardModifier) -> None:
     seat.ready()
     seat.key(Qt.Key.Key_W, down=True)
@@ -198,6 +230,7 @@ def test_space_stops_whatever_else_is_down(seat: Seat, modifiers: Qt.KeyboardMod
     seat.rests()
 
 
+@seated
 def test_shift_and_space_are_a_space_in_a_text(seat: Seat) -> None:
     seat.window.search_events()
     search = until(lambda: seat.window.side.events_tab.search, "the field")
@@ -258,6 +291,7 @@ def leaves_the_program(_seat: Seat) -> None:
         leaves_the_program,
     ],
 )
+@seated
 def test_what_takes_the_driver_away_releases_everything(seat: Seat, leave: Callable[[Seat], None]) -> None:
     seat.ready()
     seat.key(Qt.Key.Key_Up, down=True)
@@ -269,6 +303,7 @@ def test_what_takes_the_driver_away_releases_everything(seat: Seat, leave: Calla
     assert not seat.robot.base.moves, "the key is still down, and counts only when it is pressed anew"
 
 
+@seated
 def test_a_window_that_hangs_drives_nothing(seat: Seat) -> None:
     seat.ready()
     seat.key(Qt.Key.Key_W, down=True)
@@ -281,6 +316,7 @@ def test_a_window_that_hangs_drives_nothing(seat: Seat) -> None:
     assert not seat.robot.base.moves, "the key is still down, and counts only when it is pressed anew"
 
 
+@seated
 def test_a_hold_that_lapses_although_the_window_goes_on_counts_when_it_is_pressed_anew(seat: Seat) -> None:
     seat.ready()
     seat.key(Qt.Key.Key_W, down=True)
@@ -294,6 +330,7 @@ def test_a_hold_that_lapses_although_the_window_goes_on_counts_when_it_is_presse
     seat.moves()
 
 
+@seated
 def test_a_gamepad_drives_while_it_holds_and_stops_the_robot(seat: Seat) -> None:
     pad = PlayedPad()
     seat.window.driving.hands.pad = pad
@@ -312,6 +349,7 @@ def test_a_gamepad_drives_while_it_holds_and_stops_the_robot(seat: Seat) -> None
     seat.rests()
 
 
+@seated
 def test_a_gamepad_that_holds_no_more_is_reported_once(seat: Seat) -> None:
     pad = PlayedPad(why_not="it has fallen asleep")
     seat.window.driving.hands.pad = pad
@@ -320,6 +358,7 @@ def test_a_gamepad_that_holds_no_more_is_reported_once(seat: Seat) -> None:
     assert sum("it has fallen asleep" in note.text for note in seat.window.toasts.notes) == 1
 
 
+@seated
 def test_stop_is_for_anyone_and_the_latch_that_is_shown_is_reset(seat: Seat) -> None:
     reset = seat.window.strip.driving.reset
     assert not reset.isEnabled()
@@ -359,6 +398,7 @@ def under_the_list_of_keys(seat: Seat) -> None:
     "somewhere",
     [in_the_search, on_a_button, in_the_picture_alone, in_the_full_screen, under_the_list_of_keys],
 )
+@seated
 def test_space_and_the_button_stop_in_every_state_of_the_window(
     seat: Seat, somewhere: Callable[[Seat], None]
 ) -> None:
@@ -366,8 +406,8 @@ def test_space_and_the_button_stop_in_every_state_of_the_window(
     let_pass(0.2)
     stop = seat.window.strip.driving.stop_place
     assert stop.isVisible()
-    by_key = partial(seat.key, Qt.Key.Key_Space, down=True)
-    by_mouse = partial(QTest.mousePress, stop, Qt.MouseButton.LeftButton)
+    by_key = functools.partial(seat.key, Qt.Key.Key_Space, down=True)
+    by_mouse = functools.partial(QTest.mousePress, stop, Qt.MouseButton.LeftButton)
     for act in (by_key, by_mouse):
         act()
         until(lambda: seat.robot.teleop.HasField("stop"), "a stop")
@@ -379,6 +419,7 @@ def test_space_and_the_button_stop_in_every_state_of_the_window(
     assert not seat.window.side.events_tab.search.text()
 
 
+@seated
 def test_letters_drive_instead_of_their_other_meanings(seat: Seat) -> None:
     seat.ready()
     seat.key(Qt.Key.Key_Q, down=True)
@@ -391,6 +432,7 @@ def test_letters_drive_instead_of_their_other_meanings(seat: Seat) -> None:
     assert seat.window.isVisible()
 
 
+@seated
 def test_without_a_picture_nothing_moves_and_the_reason_is_shown(seat: Seat) -> None:
     press(seat.window, Qt.Key.Key_T)
     until(lambda: "There is no picture" in seat.shown(), "why")
@@ -400,6 +442,7 @@ def test_without_a_picture_nothing_moves_and_the_reason_is_shown(seat: Seat) -> 
     assert "You drive" in seat.shown()
 
 
+@seated
 def test_another_ones_driving_is_shown_and_a_refusal_said(seat: Seat) -> None:
     with monitor(seat.robot.target) as other:
         until(lambda: other.driving.hands.driveable, "it may be driven")

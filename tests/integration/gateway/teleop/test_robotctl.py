@@ -1,18 +1,20 @@
 """robotctl drive, stop and reset-stop, typed on a real terminal, at a robot of real parts."""
 
+import functools
 import json
 import signal
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import ParamSpec
 
 import pytest
 
 from console.cli.drive_keys import KNOWN_FOR_S
 from console.cli.loop_signals import ENDING
 from console.gamepad.silence import HELD_FOR_S
-from tests.support.driven_robot import DrivenRobot
+from tests.support.driven_robot import DrivenRobot, drives_undisturbed
 from tests.support.kitty import robotctl_on_kitty
 from tests.support.robotctl import robotctl, robotctl_process
 from tests.support.terminal import Terminal, robotctl_on_terminal, terminal_with
@@ -20,6 +22,8 @@ from tests.support.waiting import wait_until
 
 # Timed: on a machine that is busy with other tests, a hold lapses, and only a new one moves the robot again.
 pytestmark = [pytest.mark.ros, pytest.mark.timed]
+P = ParamSpec("P")
+
 PLAIN_ANSWER = "\x1b[?62;c"
 W_DOWN, W_REPEATED, W_UP = "\x1b[119;1:1u", "\x1b[119;1:2u", "\x1b[119;1:3u"
 EVENT_TYPES = 2
@@ -32,25 +36,23 @@ def begin(screen: Terminal, answer: str) -> None:
     screen.wait_for("hold w a s d")
 
 
-@pytest.fixture(autouse=True)
-def not_stopped(robot: DrivenRobot) -> None:
-    """What a test leaves behind must not stop the next one."""
+def driven(test: Callable[P, None]) -> Callable[P, None]:
+    """A test with a robot that is free; begun anew where a stall has cost the driver the robot."""
 
-    def is_reset() -> bool:
-        teleop = robot.teleop
-        if not teleop.HasField("stop"):
-            return True
-        # Refused while it is not known what else commands the robot.
-        robotctl("reset-stop", str(teleop.stop.stop_id), "--target", robot.target)
-        return False
+    @functools.wraps(test)
+    def begun_anew(*args: P.args, **fixtures: P.kwargs) -> None:
+        robot = fixtures["robot"]
+        assert isinstance(robot, DrivenRobot)
+        drives_undisturbed(robot, lambda: test(*args, **fixtures))
 
-    wait_until(is_reset, "no stop is latched")
+    return begun_anew
 
 
 def at_rest(robot: DrivenRobot) -> None:
     wait_until(lambda: not robot.base.moves, "the base is at rest")
 
 
+@driven
 def test_a_tap_moves_the_robot_for_a_moment(robot: DrivenRobot) -> None:
     with robotctl_on_terminal("drive", "--target", robot.target, "--speed", "0.1") as screen:
         begin(screen, PLAIN_ANSWER)
@@ -81,6 +83,7 @@ def pressed_anew(screen: Terminal, robot: DrivenRobot) -> bool:
     return robot.base.moves
 
 
+@driven
 def test_a_key_moves_the_robot_while_it_is_down_where_the_terminal_reports_that(robot: DrivenRobot) -> None:
     with robotctl_on_kitty("drive", "--target", robot.target, "--json") as screen:
         screen.wait_for('"phase": "armed"')
@@ -95,6 +98,7 @@ def test_a_key_moves_the_robot_while_it_is_down_where_the_terminal_reports_that(
         assert "\x1b[<u" in screen.read()
 
 
+@driven
 def test_a_terminal_that_freezes_releases_its_keys(robot: DrivenRobot) -> None:
     """As one does at whose end of an SSH connection the cable is cut: no release can come."""
     with robotctl_on_kitty("drive", "--target", robot.target) as screen:
@@ -116,6 +120,7 @@ def test_a_terminal_that_freezes_releases_its_keys(robot: DrivenRobot) -> None:
 
 
 @pytest.mark.parametrize("knows", [0, 1, 13], ids=["nothing", "escape codes", "all but releases"])
+@driven
 def test_a_terminal_that_speaks_the_protocol_without_releases_is_one_of_taps(
     robot: DrivenRobot, knows: int
 ) -> None:
@@ -130,6 +135,7 @@ def test_a_terminal_that_speaks_the_protocol_without_releases_is_one_of_taps(
 
 
 @pytest.mark.parametrize("number", ENDING, ids=lambda each: each.name)
+@driven
 def test_a_signal_leaves_the_terminal_as_it_was(robot: DrivenRobot, number: signal.Signals) -> None:
     with robotctl_on_kitty("drive", "--target", robot.target) as screen:
         screen.wait_for("hold w a s d")
@@ -143,6 +149,7 @@ def test_a_signal_leaves_the_terminal_as_it_was(robot: DrivenRobot, number: sign
         assert not screen.key_by_key()
 
 
+@driven
 def test_space_stops_and_the_stop_is_reset_by_its_number(robot: DrivenRobot) -> None:
     with robotctl_on_terminal("drive", "--target", robot.target) as screen:
         begin(screen, PLAIN_ANSWER)
@@ -178,6 +185,7 @@ def with_a_gamepad(robot: DrivenRobot, columns: int = 160) -> Iterator[Terminal]
         yield screen
 
 
+@driven
 def test_a_gamepad_drives_while_its_shoulder_is_held_until_it_is_unplugged(robot: DrivenRobot) -> None:
     with with_a_gamepad(robot) as screen:
         screen.press("w")
@@ -193,6 +201,7 @@ def test_a_gamepad_drives_while_its_shoulder_is_held_until_it_is_unplugged(robot
         assert screen.process.wait(20) == 0
 
 
+@driven
 def test_a_gamepad_without_a_cable_that_reports_nothing_new_is_released(robot: DrivenRobot) -> None:
     """As one out of range: the computer keeps its last values for seconds."""
     with with_a_gamepad(robot, columns=260) as screen:
@@ -210,6 +219,7 @@ def test_a_gamepad_without_a_cable_that_reports_nothing_new_is_released(robot: D
         assert screen.process.wait(20) == 0
 
 
+@driven
 def test_a_terminal_that_loses_the_focus_releases_the_gamepad_as_well(robot: DrivenRobot) -> None:
     with with_a_gamepad(robot) as screen:
         screen.process.send_signal(signal.SIGUSR1)
@@ -224,6 +234,7 @@ def test_a_terminal_that_loses_the_focus_releases_the_gamepad_as_well(robot: Dri
         assert screen.process.wait(20) == 0
 
 
+@driven
 def test_without_a_terminal_it_says_so(robot: DrivenRobot) -> None:
     refused = robotctl_process("drive", "--target", robot.target)
     assert refused.returncode == 1
