@@ -20,6 +20,11 @@ def test_a_stand_in_is_refused_by_name() -> None:
     assert "share/vision_msgs" in ended.stderr
 
 
+def test_a_stand_in_below_a_link_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to(sys.prefix)
+    assert refuse(tmp_path / "link").returncode == 1
+
+
 def test_the_real_packages_pass(tmp_path: Path) -> None:
     (tmp_path / "share" / "yolo_msgs").mkdir(parents=True)
     (tmp_path / "share" / "yolo_msgs" / "package.xml").touch()
