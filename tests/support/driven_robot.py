@@ -138,8 +138,7 @@ def anew_after_a_loss(test: Callable[P, Awaitable[None]]) -> Callable[P, Awaitab
         assert isinstance(robot, DrivenRobot)
 
         async def attempt() -> None:
-            async with available(robot):
-                pass
+            await free(robot)
             with same_worker(robot.drive):
                 await test(*args, **fixtures)
 
@@ -151,12 +150,8 @@ def anew_after_a_loss(test: Callable[P, Awaitable[None]]) -> Callable[P, Awaitab
 def drives_undisturbed(robot: DrivenRobot, attempt: Callable[[], None]) -> None:
     """Makes attempts with a robot that is free, until no stall has cost the driver the robot."""
 
-    async def free() -> None:
-        async with available(robot):
-            pass
-
     def begun() -> None:
-        asyncio.run(free())
+        asyncio.run(free(robot))
         with same_worker(robot.drive), no_stall():
             attempt()
 
@@ -206,6 +201,12 @@ async def available(robot: DrivenRobot) -> AsyncIterator[AsyncGatewayClient]:
 
         await eventually(free, bool, "the robot is free")
         yield client
+
+
+async def free(robot: DrivenRobot) -> None:
+    """Waits until the robot is free, and resets what stops it."""
+    async with available(robot):
+        pass
 
 
 @asynccontextmanager

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QApplication
 from console.client import AsyncGatewayClient, Supervision
 from console.window.monitor_window import MonitorWindow
 from console.window.programs import monitor, reading_gamepad
-from tests.support.driven_robot import DrivenRobot, available, driven_robot, moving
+from tests.support.driven_robot import DrivenRobot, driven_robot, free, moving
 from tests.support.lost_worker import reset_after_a_loss
 from tests.support.promise import MS, keeps
 from tests.support.qt import let_pass, until
@@ -89,7 +89,7 @@ class Seat:
 
 @pytest.fixture
 def seat(robot: DrivenRobot) -> Iterator[Seat]:
-    asyncio.run(freed(robot))
+    asyncio.run(free(robot))
     with virtual_pad() as pad, reading_gamepad() as reader, monitor(robot.target, pad=reader) as window:
         window.activateWindow()
         until(window.isActiveWindow, "the window is active")
@@ -103,12 +103,6 @@ async def reset(robot: DrivenRobot) -> None:
     """Resets a stop that a lost worker of the drive program has left."""
     async with AsyncGatewayClient(robot.target) as client:
         await reset_after_a_loss(client)
-
-
-async def freed(robot: DrivenRobot) -> None:
-    """Resets a stop that an earlier test has left."""
-    async with available(robot):
-        pass
 
 
 def test_a_key_is_released(seat: Seat) -> None:

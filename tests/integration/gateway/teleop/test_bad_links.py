@@ -16,6 +16,7 @@ from tests.support.driven_robot import (
     DrivenRobot,
     available,
     driven_robot,
+    free,
     held,
     in_motion,
     moving,
@@ -59,8 +60,7 @@ def link(robot: DrivenRobot) -> Iterator[TcpLink]:
 
 async def stopped_after_s(robot: DrivenRobot, link: TcpLink, fault: Callable[[], object]) -> float:
     """How long the base moves after a fault of the link, while the driver holds on; then mends the link."""
-    async with available(robot):
-        pass
+    await free(robot)
     async with AsyncGatewayClient(link.target) as client, client.drive(BY_EYE) as session:
         await in_motion(client, session, robot.base, SPEED_MPS)
         async with held(session, SPEED_MPS):

@@ -14,7 +14,16 @@ import pytest
 
 from console.client import AsyncGatewayClient, DrivePhase
 from tests.support.calendar_clock import CalendarClock
-from tests.support.driven_robot import BY_EYE, DrivenRobot, available, driven_robot, held, in_motion, moving
+from tests.support.driven_robot import (
+    BY_EYE,
+    DrivenRobot,
+    available,
+    driven_robot,
+    free,
+    held,
+    in_motion,
+    moving,
+)
 from tests.support.driver_program import driver
 from tests.support.promise import keeps_async
 
@@ -108,8 +117,7 @@ async def test_a_client_that_is_frozen_after_a_step_stops_within_280_ms(
 ) -> None:
     async def moved_s() -> float:
         clock.step(0)
-        async with available(robot):
-            pass
+        await free(robot)
         with driver(robot.target) as process:
             clock.step(step_s)
             await asyncio.sleep(STEPPED_S)

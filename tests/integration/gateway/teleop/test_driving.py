@@ -43,7 +43,7 @@ from tests.support.driven_robot import (
     BY_EYE,
     DrivenRobot,
     anew_after_a_loss,
-    available,
+    free,
     held,
     in_motion,
     is_at_rest,
@@ -64,8 +64,7 @@ async def client(robot: DrivenRobot) -> AsyncIterator[AsyncGatewayClient]:
     async with AsyncGatewayClient(robot.target) as client:
         yield client
         # What a test leaves behind must not stop the next one.
-        async with available(robot):
-            pass
+        await free(robot)
 
 
 @pytest.fixture

@@ -23,6 +23,7 @@ from tests.support.driven_robot import (
     available,
     driven_base,
     driven_robot,
+    free,
     in_motion,
     moving,
     stop_by,
@@ -53,8 +54,7 @@ async def stopped_after_s(
     recovery: Callable[[int], object] = lambda _: None,
 ) -> float:
     """How long the base moves after a fault, also if the fault ends; both get the driver's process ID."""
-    async with available(robot):
-        pass
+    await free(robot)
     with module_program("tests.support.driver_program", target, says="driving") as process:
         with moving(robot.base, robot.drive):
             began_s = time.monotonic()
