@@ -246,10 +246,7 @@ async def test_a_fallback_that_does_not_answer_is_given_up_for_the_camera_itself
     preview = Preview(tmp_path, Script(fault=SOURCE, fault_after_s=5), cameras=ROBOT)
     preview.hung.add("rear")
     async with preview.serving():
-        preview.supervisor.apply(FRONT)
-        await is_live(preview, "front")
-        await preview.until(lambda it: cameras_of(it)["rear"] is CameraState.STARTING)
-        lost_at = now()
+        lost_at = await front_is_lost(preview)
         actual = await is_live(preview, "front")
         assert now() - lost_at == pytest.approx(LOOK_S + SHOW_S)
         assert actual.counters == Counters(starts=1)
@@ -369,10 +366,7 @@ async def test_a_fallback_on_its_way_goes_on_when_it_is_chosen_again(tmp_path: P
     preview = Preview(tmp_path, Script(fault=SOURCE, fault_after_s=5), cameras=ROBOT)
     preview.hung.add("arm")
     async with preview.serving():
-        preview.supervisor.apply(FRONT)
-        await is_live(preview, "front")
-        await preview.until(lambda it: cameras_of(it)["rear"] is CameraState.STARTING)
-        lost_at = now()
+        lost_at = await front_is_lost(preview)
         await asyncio.sleep(SHOW_S / 4)
         preview.supervisor.apply(replace(ARM, revision=4))
         await asyncio.sleep(SHOW_S / 4)
@@ -404,6 +398,14 @@ async def test_a_camera_that_takes_over_during_a_look_at_it_is_not_started_again
 @in_virtual_time
 async def test_a_port_in_use(tmp_path: Path) -> None:
     await retried(Preview(tmp_path, Script(fault=PORT)), PORT.text)
+
+
+async def front_is_lost(preview: Preview) -> float:
+    """Shows front until its fallback is being started in its place; returns when that was."""
+    preview.supervisor.apply(FRONT)
+    await is_live(preview, "front")
+    await preview.until(lambda it: cameras_of(it)["rear"] is CameraState.STARTING)
+    return now()
 
 
 @row("source fails or ends")

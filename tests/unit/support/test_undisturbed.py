@@ -3,9 +3,10 @@
 import subprocess
 import threading
 from collections.abc import Iterator
-from contextlib import AbstractContextManager
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 import psutil
 import pytest
@@ -111,21 +112,15 @@ async def test_what_is_disturbed_again_and_again_fails() -> None:
     assert attempts == ATTEMPTS
 
 
-class PlayedStalls(AbstractContextManager["PlayedStalls"]):
-    longest_s = 0.0
-
-    def __exit__(self, *_: object) -> None:
-        pass
-
-
 @pytest.fixture
-def stalls(monkeypatch: pytest.MonkeyPatch) -> PlayedStalls:
-    played = PlayedStalls()
-    monkeypatch.setattr("tests.support.undisturbed.Stalls", lambda: played)
-    return played
+def stalls(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """What is found of stalls."""
+    found = SimpleNamespace(longest_s=0.0)
+    monkeypatch.setattr("tests.support.undisturbed.Stalls", lambda: nullcontext(found))
+    return found
 
 
-def test_what_fails_in_a_stall_is_begun_anew(stalls: PlayedStalls) -> None:
+def test_what_fails_in_a_stall_is_begun_anew(stalls: SimpleNamespace) -> None:
     stalls.longest_s = SPOILT_FROM_S
     with pytest.raises(DisturbedError, match="stood still"), no_stall():
         raise AssertionError
@@ -133,7 +128,7 @@ def test_what_fails_in_a_stall_is_begun_anew(stalls: PlayedStalls) -> None:
         pass
 
 
-def test_what_fails_without_a_stall_has_failed(stalls: PlayedStalls) -> None:
+def test_what_fails_without_a_stall_has_failed(stalls: SimpleNamespace) -> None:
     stalls.longest_s = SPOILT_FROM_S - 0.001
     with pytest.raises(AssertionError), no_stall():
         raise AssertionError

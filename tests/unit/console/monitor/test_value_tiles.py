@@ -1,6 +1,7 @@
 """Tiles over the picture: which ones, in which order, and how a value looks by its level and its age."""
 
 from collections.abc import Callable
+from typing import TypeVar
 
 from console.monitor.link import Link, LinkState
 from console.monitor.monitor_state import MonitorState
@@ -10,7 +11,15 @@ from gateway.config import generic_sources
 from omniseer.gateway.v1 import overlay_pb2, value_pb2
 from tests.support.snapshots import NOW_S, heard, snapshot
 
+Value = TypeVar("Value", value_pb2.NumberStatus, value_pb2.TextStatus)
 WARNING, ERROR = value_pb2.NUMBER_LEVEL_WARNING_HIGH, value_pb2.NUMBER_LEVEL_ERROR_HIGH
+
+
+def changed(value: Value, changes: dict[str, object]) -> Value:
+    """Sets fields, to their defaults as well, which a merge would leave out."""
+    for name, each in changes.items():
+        setattr(value, name, each)
+    return value
 
 
 def number(made: overlay_pb2.OverlaySnapshot, label: str = "motor", **changes: object) -> None:
@@ -26,9 +35,7 @@ def number(made: overlay_pb2.OverlaySnapshot, label: str = "motor", **changes: o
         level=value_pb2.NUMBER_LEVEL_GOOD,
         tile=True,
     )
-    for name, value in changes.items():
-        setattr(each, name, value)
-    made.status.numbers.append(each)
+    made.status.numbers.append(changed(each, changes))
     made.status.sources.add(name=f"number.{label}")
 
 
@@ -42,9 +49,7 @@ def text(made: overlay_pb2.OverlaySnapshot, label: str = "gripper", **changes: o
         level=value_pb2.TEXT_LEVEL_GOOD,
         tile=True,
     )
-    for name, value in changes.items():
-        setattr(each, name, value)
-    made.status.texts.append(each)
+    made.status.texts.append(changed(each, changes))
     made.status.sources.add(name=f"text.{label}")
 
 
