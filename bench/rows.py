@@ -26,8 +26,9 @@ class Row:
         bar: the promised limit, on the ratio where there is a reference, else on the value. None: published
             for comparison, without a promise.
         better: "lower": at most the bar keeps the promise; "higher": at least the bar does.
-        judged: "median" of the rounds; the "worst" of them where the promise is about every one; their "sum"
-            where it is about all together. Only the median of references is known.
+        judged: "median" of the rounds; the "worst" of them where the promise is about every one (with a
+            reference: the round with the worst ratio); their "sum", which has no reference, where it is about
+            all together.
         discarded: rounds that were measured and left out, because they were not comparable.
         single: whether one long round is all there is (a soak).
 
@@ -52,8 +53,8 @@ class Row:
             raise MeasurementError(f"{self.name}: {len(self.values)} rounds are too few")
         if self.references and len(self.references) != len(self.values):
             raise MeasurementError(f"{self.name}: every round needs its reference")
-        if self.references and self.judged != "median":
-            raise MeasurementError(f"{self.name}: a ratio is that of the medians")
+        if self.references and self.judged == "sum":
+            raise MeasurementError(f"{self.name}: a sum of rounds has no reference")
         if any(reference <= 0 for reference in self.references):
             raise MeasurementError(f"{self.name}: a reference of 0 makes no ratio")
 
@@ -64,7 +65,7 @@ class Row:
             return self.median
         if self.judged == "sum":
             return sum(self.values)
-        return max(self.values) if self.better == "lower" else min(self.values)
+        return self.values[self._worst_round]
 
     @property
     def median(self) -> float:
@@ -73,8 +74,12 @@ class Row:
 
     @property
     def reference(self) -> float | None:
-        """Median round of the reference."""
-        return statistics.median(self.references) if self.references else None
+        """What `value` is judged against: of the reference, the median round or the one beside the worst."""
+        if not self.references:
+            return None
+        if self.judged == "median":
+            return statistics.median(self.references)
+        return self.references[self._worst_round]
 
     @property
     def ratio(self) -> float | None:
@@ -84,10 +89,18 @@ class Row:
     @property
     def spread(self) -> tuple[float, float]:
         """Lowest and highest round of the figure that is judged: of the ratio where there is a reference."""
+        return min(self._by_round), max(self._by_round)
+
+    @property
+    def _by_round(self) -> Sequence[float]:
         if not self.references:
-            return min(self.values), max(self.values)
-        ratios = [value / reference for value, reference in zip(self.values, self.references, strict=True)]
-        return min(ratios), max(ratios)
+            return self.values
+        return [value / reference for value, reference in zip(self.values, self.references, strict=True)]
+
+    @property
+    def _worst_round(self) -> int:
+        worst = max if self.better == "lower" else min
+        return self._by_round.index(worst(self._by_round))
 
     @property
     def ok(self) -> bool:

@@ -60,6 +60,7 @@ def rows(outcome: Outcome, size: Size) -> list[Row]:
             values=[p99_ms(each.status_ms) for each in outcome.besieged],
             references=[p99_ms(each.status_ms) for each in outcome.alone],
             bar=P99_RATIO,
+            judged="worst",
         ),
         Row(
             name="siege.p99_beside",

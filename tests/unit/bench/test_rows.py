@@ -45,6 +45,14 @@ def test_the_worst_round_is_the_one_farthest_from_the_promise(better: str, worst
     assert row(references=(), judged="worst", better=better).value == worst
 
 
+def test_the_worst_ratio_is_judged_where_there_is_a_reference() -> None:
+    """Not that of the lowest value, nor one to the median of the references."""
+    measured = row(judged="worst", references=[60.0, 30.0, 50.0, 40.0, 40.0])
+    assert (measured.value, measured.reference) == (40.0, 60.0)
+    assert measured.ratio == measured.spread[0] == pytest.approx(2 / 3)
+    assert not measured.ok
+
+
 def test_all_rounds_together_are_their_sum() -> None:
     measured = row(references=(), judged="sum", values=[0.0, 1.0, 0.0, 0.0, 1.0], better="lower", bar=1)
     assert (measured.value, measured.median, measured.spread) == (2.0, 0.0, (0.0, 1.0))
@@ -56,8 +64,7 @@ def test_all_rounds_together_are_their_sum() -> None:
     [
         ({"values": [1.0] * 4, "references": [1.0] * 4}, "too few"),
         ({"values": [], "references": [], "single": True}, "too few"),
-        ({"judged": "worst"}, "that of the medians"),
-        ({"judged": "sum"}, "that of the medians"),
+        ({"judged": "sum"}, "has no reference"),
         ({"references": [1.0] * 4}, "every round needs its reference"),
         ({"references": [50.0, 50.0, 0.0, 50.0, 50.0]}, "reference of 0"),
     ],
