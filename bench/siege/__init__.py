@@ -3,8 +3,8 @@
 In turns, the operator is measured alone, beside programs that only take the attackers' core, and besieged, by
 the same clients. Attackers are programs of their own with the same priority as all others, on one core of
 this machine; on a robot they would run on other machines. They call from other addresses of this machine than
-the operator, and return when cut off. A turn begins with their first connections. Against a deployment:
-`python -m bench.siege --help`.
+the operator, in each turn from new ones, and return when cut off. A turn begins with their first connections.
+Against a deployment: `python -m bench.siege --help`.
 """
 
 import tempfile

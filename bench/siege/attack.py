@@ -35,15 +35,15 @@ async def main(host: str, port: int, plan: Plan) -> None:
 
 
 def _attackers(crowd: Crowd, plan: Plan) -> Iterator[Coroutine[Any, Any, Any]]:
-    """Source addresses are of 127.0.0.0/8, all of which is this machine."""
-    yield from (crowd.idle("127.2.0.1") for _ in range(plan.idle))
+    """Source addresses are of 127.0.0.0/8, all of which is this machine; those of another turn are others."""
+    yield from (crowd.idle(f"127.2.{plan.turn}.1") for _ in range(plan.idle))
     for address in range(plan.addresses):
-        yield from (crowd.idle(f"127.1.0.{1 + address}") for _ in range(plan.idle_per_address))
-    yield from (crowd.drip("127.3.0.1") for _ in range(plan.slow))
+        yield from (crowd.idle(f"127.1.{plan.turn}.{1 + address}") for _ in range(plan.idle_per_address))
+    yield from (crowd.drip(f"127.3.{plan.turn}.1") for _ in range(plan.slow))
     if plan.burns:
         yield _burn()
     for number in range(plan.flooders):
-        yield crowd.flood(f"127.4.0.{1 + number}", plan.tokens[number % len(plan.tokens)])
+        yield crowd.flood(f"127.4.{plan.turn}.{1 + number}", plan.tokens[number % len(plan.tokens)])
 
 
 async def _burn() -> NoReturn:

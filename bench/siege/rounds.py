@@ -6,7 +6,7 @@ import sys
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 
 from bench.progress import log
 from bench.siege.crowd import Counts
@@ -76,8 +76,8 @@ async def besiege(ground: Ground, size: Size) -> Outcome:
             outcome.between.append(operator.begin_record())
             async with (
                 _streams(ground, name, size.streams) as streams,
-                _attack(ground, size.holders) as holders,
-                _attack(ground, floods) as flooders,
+                _attack(ground, replace(size.holders, turn=turn)) as holders,
+                _attack(ground, replace(floods, turn=turn)) as flooders,
             ):
                 outcome.besieged.append(operator.begin_record())
                 outcome.unbesieged_mib = outcome.unbesieged_mib or peaks.resident_mib

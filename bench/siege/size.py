@@ -16,6 +16,7 @@ class Plan:
         flooders: callers with wrong tokens, each from an address of its own.
         tokens: theirs, in turns.
         burns: whether the process does nothing but take its core, as a control.
+        turn: of the siege, from 0; no address attacks in two of them, so none is blocked when it begins.
     """
 
     idle: int = 0
@@ -25,6 +26,7 @@ class Plan:
     flooders: int = 0
     tokens: tuple[str, ...] = ()
     burns: bool = False
+    turn: int = 0
 
 
 @dataclass(frozen=True, slots=True)
