@@ -12,6 +12,7 @@ import pytest
 
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from tests.support.free import udp_port_is_free
+from tests.support.processes import has_ended
 from tests.support.promise import keeps
 from tests.support.running_preview import RunningPreview
 from tests.support.udp_link import UdpLink
@@ -67,7 +68,7 @@ def test_a_signal_ends_it_also_while_an_encoder_hangs_in_its_trial(tmp_path: Pat
         (trial,) = wait_until(lambda: psutil.Process(preview.process.pid).children(), "the trial")
         preview.process.terminate()
         assert preview.process.wait(STOP_WITHIN_S) == 0
-        assert not trial.is_running()
+        wait_until(lambda: has_ended(trial.pid), "the trial has ended")
 
 
 def test_an_element_that_is_not_there_is_named(tmp_path: Path) -> None:

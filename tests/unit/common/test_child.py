@@ -6,9 +6,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import psutil
 import pytest
 
+from tests.support.processes import has_ended
 from tests.support.waiting import wait_until
 
 ROOT = Path(__file__).parents[3]
@@ -41,10 +41,10 @@ def test_it_ends_with_its_parent(number: signal.Signals) -> None:
         assert parent.stdout
         lines = {parent.stdout.readline().strip(), parent.stdout.readline().strip()}
         assert "begun" in lines
-        helper = psutil.Process(int((lines - {"begun"}).pop()))
+        helper = int((lines - {"begun"}).pop())
         os.kill(parent.pid, number)
         parent.wait(10)
-        wait_until(lambda: not helper.is_running() or helper.status() == psutil.STATUS_ZOMBIE, "it ended")
+        wait_until(lambda: has_ended(helper), "it ended")
 
 
 def test_it_ends_after_its_time() -> None:

@@ -10,6 +10,7 @@ import psutil
 import pytest
 
 from common.guard import EXIT_SILENT
+from tests.support.processes import has_ended
 from tests.support.waiting import wait_until
 
 ROOT = Path(__file__).parents[3]
@@ -89,7 +90,7 @@ def test_a_program_that_falls_silent_is_killed(freeze: str) -> None:
         said = guard.stderr.read()
         assert "no heartbeat for 1 s, killed" in said
         assert ("Fatal Python error: Aborted" in said) is (freeze != "SIGSTOP")
-        assert not psutil.pid_exists(child)
+        assert has_ended(child)
 
 
 def test_a_program_that_never_begins_is_killed() -> None:
@@ -115,10 +116,10 @@ def test_frozen_together_with_its_program_it_waits_again() -> None:
 
 def test_a_killed_guard_leaves_no_program_behind() -> None:
     with guarded(BEATS.format("")) as guard:
-        child = psutil.Process(first_line(guard))
+        child = first_line(guard)
         guard.kill()
         guard.wait(10)
-        wait_until(lambda: not child.is_running() or child.status() == psutil.STATUS_ZOMBIE, "it ended")
+        wait_until(lambda: has_ended(child), "it ended")
 
 
 def test_a_program_that_does_not_exist_is_one_line() -> None:

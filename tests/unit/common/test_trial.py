@@ -12,6 +12,7 @@ import psutil
 import pytest
 
 from common import trial
+from tests.support.processes import has_ended
 from tests.support.waiting import wait_until
 
 ROOT = Path(__file__).parents[3]
@@ -98,4 +99,4 @@ def test_a_child_does_not_outlive_its_parent() -> None:
         (child,) = wait_until(lambda: psutil.Process(parent.pid).children(), "the child")
         parent.kill()
         parent.wait(10)
-        wait_until(lambda: not child.is_running() or child.status() == psutil.STATUS_ZOMBIE, "it ended")
+        wait_until(lambda: has_ended(child.pid), "it ended")

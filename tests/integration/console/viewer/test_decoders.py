@@ -15,6 +15,7 @@ import pytest
 from console.receiver import clips
 from console.receiver.decoder_probe import objection
 from tests.support.clips import FRAMES
+from tests.support.processes import has_ended
 from tests.support.robotctl import robotctl_process
 from tests.support.video_ground import VideoGround, video_ground
 from tests.support.waiting import wait_until
@@ -104,17 +105,13 @@ def trial_in_progress(**environment: str) -> Iterator[tuple["subprocess.Popen[by
             parent.kill()
 
 
-def ended(process: psutil.Process) -> bool:
-    return not process.is_running() or process.status() == psutil.STATUS_ZOMBIE
-
-
 def test_a_trial_that_hangs_in_its_driver_ends_with_its_parent() -> None:
     with trial_in_progress(**with_doubles(vah264dec="stuck")) as (parent, trial):
         wait_until(
             lambda: any("libgstreamer" in each.path for each in trial.memory_maps()), "GStreamer is loaded"
         )
         parent.kill()
-        wait_until(lambda: ended(trial), "it ends", ENDS_WITHIN_S)
+        wait_until(lambda: has_ended(trial.pid), "it ends", ENDS_WITHIN_S)
 
 
 def test_a_trial_that_hangs_before_it_has_loaded_gstreamer_ends_with_its_parent(tmp_path: Path) -> None:
@@ -129,7 +126,7 @@ def test_a_trial_that_hangs_before_it_has_loaded_gstreamer_ends_with_its_parent(
     with trial_in_progress(PYTHONPATH=str(tmp_path)) as (parent, trial):
         wait_until(begun.exists, "it loads GStreamer")
         parent.kill()
-        wait_until(lambda: ended(trial), "it ends", ENDS_WITHIN_S)
+        wait_until(lambda: has_ended(trial.pid), "it ends", ENDS_WITHIN_S)
 
 
 def test_a_trial_whose_parent_is_gone_already_does_not_begin() -> None:
