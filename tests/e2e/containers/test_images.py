@@ -109,6 +109,32 @@ def test_saving_what_was_not_built_leaves_no_file(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.usefixtures("images")
+def test_an_image_with_stand_ins_is_for_no_robot() -> None:
+    """Also where compose builds it, without scripts/images, which refuses before it begins."""
+    secrets = ". docker/build-secrets.sh && export BUILD_CA BUILD_INDEX"
+    command = f"{secrets} && docker compose --progress plain build gateway"
+    ended = subprocess.run(
+        ["bash", "-c", command],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+        env={
+            **os.environ,
+            "COMPOSE_FILE": "compose.yaml",
+            "ROS": "wheels",
+            "ALLOW_STAND_INS": "",
+            "TAG": "no-robot",
+        },
+    )
+    said = ended.stdout + ended.stderr
+    assert ended.returncode != 0, said
+    assert "stand-ins in an image for robots" in said
+    assert "yolo_msgs" in said
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
