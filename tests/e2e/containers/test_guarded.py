@@ -17,9 +17,10 @@ from console.credentials import Credentials
 from console.receiver.address import StreamAddress
 from console.receiver.errors import StreamRefusedError
 from console.robots.login import parse_login
+from gateway.rpc.connections.admission import MAX_PENDING
 from tests.e2e.containers.credentials import ADD, added, knows, typed
 from tests.e2e.containers.deployment import Deployment, demo_overlay, deployed, docker, mounts, writable
-from tests.support.engine import ROOT
+from tests.support.engine import ROOT, TAG
 from tests.support.receiver import Receiver
 from tests.support.robotctl import robotctl
 from tests.support.waiting import wait_until
@@ -38,6 +39,8 @@ REVOKE = "docker compose run --rm -T credentials revoke anna"
 LIST = "docker compose run --rm -T credentials list"
 READ_AUDIT = f"docker compose exec gateway cat {AUDIT}/audit.jsonl"
 READ_REFUSED = f"docker compose exec gateway cat {AUDIT}/audit-refused.jsonl"
+KEPT_AWAY = 6
+"""Attempts of half a second: longer than the first block of an address lasts, shorter than the second."""
 HEALTH = "docker compose exec gateway python -m common.healthcheck unix:/tmp/health.sock preview"
 
 
@@ -90,6 +93,33 @@ def guarded(
             wait_until(lambda: knows(robot), "the gateway knows its new credentials")
             deployment.wait_for_status(robot)
         yield Guarded(deployment, refused, told, gateways_then, begun, anna, ben)
+
+
+STRANGER = f"""
+import socket, time
+held, in_a_row, until_s = [], 0, time.monotonic() + 15
+while in_a_row < {KEPT_AWAY} and time.monotonic() < until_s:
+    try:
+        held.append(socket.create_connection(("gateway", 50051), timeout=0.5))
+        in_a_row = 0
+        time.sleep(0.02)
+    except TimeoutError:
+        in_a_row += 1
+
+def is_open(connection):
+    connection.setblocking(False)
+    try:
+        return bool(connection.recv(1024))
+    except BlockingIOError:
+        return True
+    except ConnectionError:
+        return False
+
+print(in_a_row, len(held), sum(is_open(each) for each in held))
+"""
+"""Connects and says nothing, until attempts in a row come to nothing; 50 times a second else."""
+FILTERS = "from gateway.rpc.connections import packet_filter; import socket; "
+FILTERS += "packet_filter.attach(socket.create_server(('127.0.0.1', 0)), packet_filter.DROP_ALL)"
 
 
 def reason(deployment: Deployment, shown: Credentials | None) -> str:
@@ -254,6 +284,29 @@ def test_a_gateway_that_was_broken_into_can_not_let_anybody_in(guarded: Guarded)
     assert not eve.stdout
     assert "Read-only file system" in eve.stderr
     assert "Traceback" not in eve.stderr
+
+
+def test_an_address_that_connects_again_and_again_costs_others_nothing(guarded: Guarded) -> None:
+    """Kept away by the kernel, or, where that permits filters to root alone, closed as it comes."""
+    robot = guarded.deployment
+    permitted = robot.run("exec", "gateway", "python", "-c", FILTERS, check=False).returncode == 0
+    stranger = (
+        "--network",
+        f"{robot.project}_graph",
+        "--rm",
+        "--entrypoint",
+        "python",
+        f"robot-gateway:{TAG}",
+    )
+    with robot.client(guarded.anna) as operator:
+        said = docker("run", *stranger, "-c", STRANGER)
+        assert operator.status().health.summary == "robot healthy"
+    in_a_row, held, still_open = map(int, said.split())
+    assert still_open <= MAX_PENDING // 2
+    assert (in_a_row == KEPT_AWAY) is permitted
+    assert permitted or held > MAX_PENDING
+    with robot.client(guarded.ben) as new:
+        assert new.status().health.summary == "robot healthy"
 
 
 def test_nothing_can_be_written_beyond_what_is_declared(guarded: Guarded) -> None:
