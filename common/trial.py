@@ -6,6 +6,7 @@
 import asyncio
 import json
 import os
+import select
 import signal
 import sys
 from contextlib import suppress
@@ -15,6 +16,8 @@ from common.deadline import within
 
 _KILL_S: Final = 1.0
 """For the end of a killed child; a driver may keep it in the kernel for longer."""
+_held: Final[dict[tuple[str, ...], int]] = {}
+"""Process descriptors (pidfd_open(2)) of killed children that a driver keeps, by module and arguments."""
 _MAX_OUTPUT_BYTES: Final = 64 * 1024
 
 
@@ -33,7 +36,8 @@ class TrialError(Exception):
 async def run(timeout_s: float, module: str, *arguments: str) -> dict[str, Any]:
     """Runs `module.main(*arguments)` in a child process and returns what it reports.
 
-    Cancelling it kills the child; it does not take longer than a second more.
+    Cancelling it kills the child; it does not take longer than a second more. While a driver keeps a killed
+    child in the kernel, none is started for the same trial: it would hang, too, and stay as well.
 
     Args:
         timeout_s: deadline in seconds, start of the process included.
@@ -43,6 +47,9 @@ async def run(timeout_s: float, module: str, *arguments: str) -> dict[str, Any]:
     Raises:
         TrialError: the child reported an error, crashed, exceeded the deadline or could not be started.
     """
+    what = (module, *arguments)
+    if _is_held(what):
+        raise TrialError("its last trial was killed and has not ended", passing=True)
     try:
         child = await asyncio.create_subprocess_exec(
             *(sys.executable, "-m", "common.trial_child", str(os.getpid()), module, *arguments),
@@ -58,11 +65,9 @@ async def run(timeout_s: float, module: str, *arguments: str) -> dict[str, Any]:
         with suppress(TimeoutError):
             output = await within(timeout_s, _output(child))
     finally:
-        await _kill(child)
+        await _kill(child, what)
     if output is None:
-        # One that can't even be killed keeps its driver busy: the next one would hang, too.
-        ended = child.returncode is not None
-        raise TrialError(f"it hung: no result within {timeout_s:g} s", passing=ended)
+        raise TrialError(f"it hung: no result within {timeout_s:g} s", passing=True)
     return parse_result(output, child.returncode or 0)
 
 
@@ -86,13 +91,27 @@ async def _output(child: asyncio.subprocess.Process) -> bytes:
     return output
 
 
-async def _kill(child: asyncio.subprocess.Process) -> None:
-    """Kills a child that still runs, and waits for its end for at most _KILL_S."""
-    if child.returncode is None:
-        with suppress(ProcessLookupError):
-            child.kill()
-        with suppress(TimeoutError):
-            await within(_KILL_S, child.wait())
+async def _kill(child: asyncio.subprocess.Process, what: tuple[str, ...]) -> None:
+    """Kills a child that still runs, and waits for its end for at most _KILL_S; notes one that is held."""
+    if child.returncode is not None:
+        return
+    with suppress(ProcessLookupError):
+        child.kill()
+    try:
+        await within(_KILL_S, child.wait())
+    except TimeoutError:
+        with suppress(ProcessLookupError):  # It has just ended.
+            _held[what] = os.pidfd_open(child.pid)
+
+
+def _is_held(what: tuple[str, ...]) -> bool:
+    """Returns whether a killed child of this trial has still not ended; forgets those that have."""
+    for key, handle in list(_held.items()):
+        ended = select.poll()
+        ended.register(handle, select.POLLIN)
+        if ended.poll(0):
+            os.close(_held.pop(key))
+    return what in _held
 
 
 def parse_result(output: bytes, code: int) -> dict[str, Any]:
