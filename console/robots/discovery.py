@@ -14,7 +14,13 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Final, Self
 
-from zeroconf import InterfaceChoice, ServiceBrowser, ServiceStateChange, Zeroconf
+from zeroconf import (
+    BadTypeInNameException,
+    InterfaceChoice,
+    ServiceBrowser,
+    ServiceStateChange,
+    Zeroconf,
+)
 from zeroconf.asyncio import AsyncServiceInfo
 
 from common.advertisement import SERVICE_TYPE, advertisement_from
@@ -120,8 +126,11 @@ class Discovery:
         self, zeroconf: Zeroconf, service_type: str, name: str, state_change: ServiceStateChange
     ) -> None:
         """Called in a thread of zeroconf's."""
+        info = _question(service_type, name)
         with self._lock:
             self._changes += 1
+            if info is None:
+                return
             if state_change is ServiceStateChange.Removed:
                 self._found.pop(name, None)
                 return
@@ -132,7 +141,7 @@ class Discovery:
         loop = zeroconf.loop
         if loop is None or loop.is_closed():
             return
-        asking = asyncio.run_coroutine_threadsafe(self._ask(AsyncServiceInfo(service_type, name)), loop)
+        asking = asyncio.run_coroutine_threadsafe(self._ask(info), loop)
         with self._lock:
             self._asking.add(asking)
         asking.add_done_callback(self._asked)
@@ -183,6 +192,20 @@ def discover(within_s: float, addresses: Iterable[str] = ()) -> tuple[tuple[Disc
     with Discovery(addresses) as discovery:
         time.sleep(within_s)
         return discovery.robots, discovery.truncated
+
+
+def _question(service_type: str, name: str) -> AsyncServiceInfo | None:
+    """Returns what asks for the records of a name; None where it is no instance of the service.
+
+    Anything may be announced as one (RFC 6763 4.1 has the form), and an exception would end the thread of
+    zeroconf that hands names over.
+    """
+    if not name.endswith(f".{service_type}"):
+        return None
+    try:
+        return AsyncServiceInfo(service_type, name)
+    except BadTypeInNameException:
+        return None
 
 
 def _robot(info: AsyncServiceInfo, *, loopback: bool) -> DiscoveredRobot | None:

@@ -114,6 +114,22 @@ def test_hostile_announcements_are_harmless(attacker: Zeroconf) -> None:
         assert each.contract.isprintable()
 
 
+@pytest.mark.parametrize("name", [f"\x1b]0;owned\x07.{SERVICE_TYPE}", "lab._other._tcp.local.", "x."])
+def test_a_hostile_name_ends_no_search(
+    attacker: Zeroconf, capfd: pytest.CaptureFixture[str], name: str
+) -> None:
+    """One such packet ended the thread that hears of robots: none that came later was found."""
+    with Discovery([LOOPBACK]) as discovery:
+        out = DNSOutgoing(dns._FLAGS_QR_RESPONSE | dns._FLAGS_AA, multicast=True)
+        out.add_answer_at_time(DNSPointer(SERVICE_TYPE, dns._TYPE_PTR, dns._CLASS_IN, 4500, name), 0)
+        attacker.send(out)
+        wait_until(lambda: discovery._changes, "it is heard", ANNOUNCED_WITHIN_S)
+        announce(attacker, announcement("after", name=b"after"))
+        names = wait_until(lambda: {each.name for each in discovery.robots}, "a robot", ANNOUNCED_WITHIN_S)
+    assert "after" in names
+    assert capfd.readouterr().err == "", "no word of a stranger's reaches the terminal"
+
+
 def test_an_announcement_from_the_network_cant_name_this_computer(attacker: Zeroconf) -> None:
     """With addresses of other interfaces, loopback addresses are left out."""
     announce(attacker, announcement("self", name=b"self"))
