@@ -226,4 +226,7 @@ def _robot(info: AsyncServiceInfo, *, loopback: bool) -> DiscoveredRobot | None:
 def _is_callable(text: str, *, loopback: bool) -> bool:
     """Returns whether an address can be another machine's: an announcement must not name this computer."""
     address = ipaddress.ip_address(text)
+    if isinstance(address, ipaddress.IPv6Address) and address.ipv4_mapped:
+        # ::ffff:127.0.0.1 is this computer as well, which `ipaddress` knows from Python 3.13 on.
+        address = address.ipv4_mapped
     return not (address.is_multicast or address.is_unspecified) and (loopback or not address.is_loopback)

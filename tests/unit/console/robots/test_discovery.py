@@ -5,9 +5,10 @@ from typing import Any
 
 import pytest
 from zeroconf import ServiceStateChange
+from zeroconf.asyncio import AsyncServiceInfo
 
 from common.advertisement import SERVICE_TYPE
-from console.robots.discovery import Discovery
+from console.robots.discovery import Discovery, _robot
 
 
 class Network:
@@ -40,3 +41,21 @@ def test_a_name_that_is_none_of_this_service_is_left_out_and_ends_nothing(
     good = f"lab 1.{SERVICE_TYPE}"
     discovery._on_change(Network(), SERVICE_TYPE, good, ServiceStateChange.Added)  # type: ignore[arg-type]
     assert list(discovery._found) == [good]
+
+
+@pytest.mark.parametrize(
+    ("address", "target"),
+    [
+        ("10.0.0.2", "10.0.0.2:50051"),
+        ("2001:db8::2", "[2001:db8::2]:50051"),
+        *((each, None) for each in ("127.0.0.1", "::1", "0.0.0.0", "::", "224.0.0.1", "ff02::1")),  # noqa: S104
+        # IPv4 in the form of IPv6 (RFC 4291 2.5.5.2): connections to it are IPv4's.
+        *((f"::ffff:{each}", None) for each in ("127.0.0.1", "0.0.0.0", "224.0.0.1")),  # noqa: S104
+    ],
+)
+def test_an_address_must_be_another_machines(address: str, target: str | None) -> None:
+    info = AsyncServiceInfo(
+        SERVICE_TYPE, f"lab.{SERVICE_TYPE}", 50051, properties={}, parsed_addresses=[address]
+    )
+    robot = _robot(info, loopback=False)
+    assert (robot and robot.target) == target
