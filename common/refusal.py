@@ -12,6 +12,8 @@ DOMAIN: Final = "omniseer.gateway.v1"
 """The `domain` of google.rpc.ErrorInfo: who defines the reasons. Those of a proxy have another."""
 _KEY: Final = "grpc-status-details-bin"
 _NS_PER_S: Final = 1_000_000_000
+_LONGEST_S: Final = 365 * 86_400
+"""A delay beyond it is no help; time.sleep() and asyncio.sleep() take it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +34,8 @@ def refusal_in(metadata: Iterable[Any] | None) -> Refusal:
         status.MergeFromString(data)
         for detail in status.details:
             if detail.Unpack(retry):
-                retry_after_s = retry.retry_delay.ToNanoseconds() / _NS_PER_S
+                delay_s = retry.retry_delay.ToNanoseconds() / _NS_PER_S
+                retry_after_s = delay_s if 0 <= delay_s <= _LONGEST_S else None
             elif not detail.Unpack(info):
                 detail.Unpack(request)
     except DecodeError:

@@ -5,6 +5,9 @@ from typing import Any
 
 import grpc
 import pytest
+from google.protobuf.duration_pb2 import Duration
+from google.rpc.error_details_pb2 import RetryInfo
+from google.rpc.status_pb2 import Status
 
 from common.errors import (
     DefectError,
@@ -162,6 +165,21 @@ def test_without_readable_details_the_code_speaks_alone(metadata: Any) -> None:
     error = error_from(Failure(grpc.StatusCode.RESOURCE_EXHAUSTED, "no", metadata), "robot:50051", 2.0)
     assert type(error) is errors.Overloaded
     assert (error.reason, error.fields, error.retry_after_s) == ("", (), None)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "nanos", "retry_after_s"),
+    [(0, 250_000_000, 0.25), (0, -1, None), (-1, 0, None), (-(2**63), 0, None), (10**10, 0, None)],
+)
+def test_only_a_delay_that_can_be_waited_is_one(
+    seconds: int, nanos: int, retry_after_s: float | None
+) -> None:
+    """A program may hand it to time.sleep(), which raises for a negative one and for one without end."""
+    status = Status()
+    status.details.add().Pack(RetryInfo(retry_delay=Duration(seconds=seconds, nanos=nanos)))
+    metadata = (("grpc-status-details-bin", status.SerializeToString()),)
+    error = error_from(Failure(grpc.StatusCode.RESOURCE_EXHAUSTED, "no", metadata), "robot:50051", 2.0)
+    assert error.retry_after_s == retry_after_s
 
 
 def test_a_word_of_a_newer_gateway_leaves_the_code_to_speak(monkeypatch: pytest.MonkeyPatch) -> None:
