@@ -52,6 +52,8 @@ NAMES: Final = (
     "receivers_request",
     "kernels_answer",
     "field_path",
+    "gateways_refusal",
+    "announcement",
 )
 """Of `targets.TARGETS`, which only a worker loads (a test compares)."""
 

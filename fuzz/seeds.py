@@ -4,14 +4,18 @@ import hashlib
 import struct
 from typing import Any, Final
 
+import grpc
 from mcap.records import Channel, Message, Schema
 from rclpy.serialization import serialize_message
 
 from common import camera_tap
 from common.ca import new_ca
+from common.errors import FieldViolation, InvalidRequestError
+from common.grpc_errors import metadata_of
 from common.video_tap import Header, Kind, encode_object
 from fuzz import recording
 from fuzz.fleet import REQUESTS, ROBOT
+from fuzz.network import FULL_NAME
 from fuzz.programs import NOW_NS
 from fuzz.robot import SOURCES, type_of
 from omniseer.bridge.v1 import bridge_service_pb2 as bridge_pb
@@ -189,6 +193,15 @@ def _drive_report() -> bytes:
     return drive_pb2.FromDrive(actual=actual).SerializeToString()
 
 
+def _refusal(retry_after_s: float) -> bytes:
+    """A refusal with all the details that there are, in the form of the target."""
+    error = InvalidRequestError("two things", (FieldViolation("min_interval_ms", "is too much"),))
+    error.retry_after_s = retry_after_s
+    details = dict(metadata_of(error, grpc.StatusCode.INVALID_ARGUMENT))["grpc-status-details-bin"]
+    assert isinstance(details, bytes)  # the value of a key that ends in "-bin"
+    return bytes((3, 10)) + b"two things" + details
+
+
 _SEEDS: Final = {
     "operators_request": [
         robot_gateway_pb2.SetPreviewModeRequest(
@@ -304,6 +317,13 @@ _SEEDS: Final = {
         + struct.pack("=HHi", 8, 4, 2)
     ],
     "field_path": [b"\0cell_voltage[1]", b"\1status[0].level", b"\2pose.covariance[35]"],
+    "gateways_refusal": [_refusal(each) for each in (0.25, -1.0, 1e10)],
+    "announcement": [
+        bytes((5, 1, 0xC3, 0x83)) + b"lab 1" + bytes((10, 0, 0, 2)) + b"\x09name=lab1\x05tls=1",
+        bytes((5, 4, 0xC3, 0x83)) + b"lab 1" + bytes((0xFE, 0x80, *bytes(13), 2)) + b"\x11contract=omniseer",
+        bytes((5, 4, 0xC3, 0x83)) + b"lab 1" + bytes((*bytes(10), 0xFF, 0xFF, 10, 0, 0, 2)),
+        bytes((18, FULL_NAME + 1, 0xC3, 0x83)) + b"lab._o._tcp.local." + bytes((10, 0, 0, 2)),
+    ],
     "known_robots": [b'default = "lab2"\n[robots.lab2]\ntarget = "10.0.0.5:50051"\n'],
 }
 

@@ -33,6 +33,7 @@ from console.robots.login import parse_login
 from console.robots.robots_file import parse_robots_file
 from fuzz.admission import admission
 from fuzz.fleet import field_path, gateways_status, hubs_content, kernels_answer, receivers_request
+from fuzz.network import announcement, gateways_refusal
 from fuzz.programs import bridges_report, drives_report, gateways_packets, recorders_report
 from fuzz.recording import export_request, segment, video_tap
 from fuzz.robot import robots_message
@@ -290,6 +291,8 @@ TARGETS: Final[Mapping[str, Target]] = MappingProxyType(
             receivers_request,
             kernels_answer,
             field_path,
+            gateways_refusal,
+            announcement,
         )
     }
 )

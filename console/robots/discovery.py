@@ -126,7 +126,7 @@ class Discovery:
         self, zeroconf: Zeroconf, service_type: str, name: str, state_change: ServiceStateChange
     ) -> None:
         """Called in a thread of zeroconf's."""
-        info = _question(service_type, name)
+        info = question(service_type, name)
         with self._lock:
             self._changes += 1
             if info is None:
@@ -154,7 +154,7 @@ class Discovery:
         """Asks for address and properties of a name, where the announcement did not have them."""
         if not await info.async_request(self._zeroconf, _ASK_WITHIN_MS):
             return
-        robot = _robot(info, loopback=self._local)
+        robot = robot_in(info, loopback=self._local)
         with self._lock:
             if info.name in self._found:
                 self._found[info.name] = robot
@@ -194,7 +194,7 @@ def discover(within_s: float, addresses: Iterable[str] = ()) -> tuple[tuple[Disc
         return discovery.robots, discovery.truncated
 
 
-def _question(service_type: str, name: str) -> AsyncServiceInfo | None:
+def question(service_type: str, name: str) -> AsyncServiceInfo | None:
     """Returns what asks for the records of a name; None where it is no instance of the service.
 
     Anything may be announced as one (RFC 6763 4.1 has the form), and an exception would end the thread of
@@ -208,7 +208,7 @@ def _question(service_type: str, name: str) -> AsyncServiceInfo | None:
         return None
 
 
-def _robot(info: AsyncServiceInfo, *, loopback: bool) -> DiscoveredRobot | None:
+def robot_in(info: AsyncServiceInfo, *, loopback: bool) -> DiscoveredRobot | None:
     """Returns a robot of an announcement; None if it has no address to call."""
     announced = advertisement_from(info.properties)
     addresses = [each for each in info.parsed_scoped_addresses() if _is_callable(each, loopback=loopback)]

@@ -8,7 +8,7 @@ from zeroconf import ServiceStateChange
 from zeroconf.asyncio import AsyncServiceInfo
 
 from common.advertisement import SERVICE_TYPE
-from console.robots.discovery import Discovery, _robot
+from console.robots.discovery import Discovery, robot_in
 
 
 class Network:
@@ -57,5 +57,5 @@ def test_an_address_must_be_another_machines(address: str, target: str | None) -
     info = AsyncServiceInfo(
         SERVICE_TYPE, f"lab.{SERVICE_TYPE}", 50051, properties={}, parsed_addresses=[address]
     )
-    robot = _robot(info, loopback=False)
+    robot = robot_in(info, loopback=False)
     assert (robot and robot.target) == target
