@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from common.errors import UserError
-from common.private_files import write_all_private, write_private
+from common.private_files import make_own_directory, write_all_private, write_private
+from tests.support.file_owner import files_belong_to
 
 
 class Disk:
@@ -66,3 +67,31 @@ def test_a_file_of_another_user_stays_that_users(tmp_path: Path, monkeypatch: py
     status = (tmp_path / "file").stat()
     assert given == [(status.st_uid, status.st_gid)]
     assert (tmp_path / "file").read_bytes() == b"new"
+
+
+def test_a_directory_of_ones_own_is_closed_to_others(tmp_path: Path) -> None:
+    make_own_directory(tmp_path / "new")
+    assert (tmp_path / "new").stat().st_mode & 0o7777 == 0o700
+    (tmp_path / "open").mkdir()
+    (tmp_path / "open").chmod(0o777)
+    make_own_directory(tmp_path / "open")
+    assert (tmp_path / "open").stat().st_mode & 0o7777 == 0o700
+
+
+def test_a_directory_of_another_user_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As one that was made under a foreseeable name in /tmp; root could change its mode all the same."""
+    tmp_path.chmod(0o755)
+    files_belong_to(os.geteuid() + 1, monkeypatch)
+    with pytest.raises(PermissionError, match="not this user's own"):
+        make_own_directory(tmp_path)
+    assert tmp_path.stat().st_mode & 0o7777 == 0o755
+
+
+def test_neither_a_link_nor_the_directory_of_everyone_is_ones_own(tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to(tmp_path)
+    with pytest.raises(OSError, match=r"Not a directory|symbolic links"):
+        make_own_directory(tmp_path / "link")
+    (tmp_path / "everyones").mkdir()
+    (tmp_path / "everyones").chmod(0o1777)
+    with pytest.raises(PermissionError, match="not this user's own"):
+        make_own_directory(tmp_path / "everyones")

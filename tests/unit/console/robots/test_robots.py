@@ -1,5 +1,6 @@
 """The file of known robots, read strictly and edited with its comments kept; and the secrets beside it."""
 
+import os
 import stat
 import threading
 from dataclasses import replace
@@ -13,6 +14,7 @@ from console.robots import Robot, RobotsFile, choose, read_credentials, read_rob
 from console.robots.credentials import credentials_directory, forget_credentials
 from console.robots.robots_file import parse_robots_file, robots_file_path
 from console.robots.robots_file_edit import drop_robot, put_robot, set_default
+from tests.support.file_owner import files_belong_to
 
 FULL = """\
 # mine
@@ -359,6 +361,22 @@ def test_a_secret_that_others_may_touch_is_refused(full: Path, which: str, right
     assert seen.value.exit_code is ExitCode.USAGE
     path.chmod(0o600)
     read_credentials(robot)
+
+
+@pytest.mark.parametrize("which", ["token_file", "client_key_file"])
+def test_a_secret_of_another_user_is_refused(full: Path, which: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """That user may replace it at any time; root may anyway."""
+    robot = Robot(target="a:1", **{which: getattr(secured(full), which)})
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    for user in (1000, 0):
+        with monkeypatch.context() as patched:
+            files_belong_to(user, patched)
+            read_credentials(robot)
+    files_belong_to(1001, monkeypatch)
+    with pytest.raises(UserError, match="belongs to another user") as seen:
+        read_credentials(robot)
+    assert str(getattr(robot, which)) in seen.value.what
+    assert seen.value.exit_code is ExitCode.USAGE
 
 
 @pytest.mark.parametrize("text", [b"", b"\n", b"two words", b"two\nlines", b"\xff\xfe", b'"quoted"'])

@@ -9,6 +9,7 @@ from common.errors import UserError
 from gateway.access.credential_admin import CredentialAdmin
 from gateway.access.directory import CredentialDirectory, KeyPairFiles
 from gateway.access.store import Store
+from tests.support.file_owner import files_belong_to
 
 
 def test_where_there_is_nothing_the_line_says_how_to_begin(tmp_path: Path) -> None:
@@ -27,16 +28,10 @@ def test_in_a_container_it_is_the_command_that_works_there(
 
 
 def test_a_file_of_another_user_is_not_trusted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    files, fstat = CredentialDirectory(tmp_path), os.fstat
+    files = CredentialDirectory(tmp_path)
     CredentialAdmin(files, "lab").initialize(("localhost",))
     assert files.read_store() == Store()
-
-    def of_another_user(handle: int) -> os.stat_result:
-        found = list(fstat(handle))
-        found[4] = os.geteuid() + 1
-        return os.stat_result(found)
-
-    monkeypatch.setattr(os, "fstat", of_another_user)
+    files_belong_to(os.geteuid() + 1, monkeypatch)
     for read in (files.read_store, files.server.read, files.ca.read):
         with pytest.raises(UserError, match="belongs to another user") as seen:
             read()
