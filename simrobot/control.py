@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from common.errors import ExitCode, UserError
+from common.private_files import make_own_directory
 
 _LONGEST_LINE = 64 * 1024
 _TIMEOUT_S = 5.0
@@ -27,9 +28,22 @@ BaseFacts = Callable[[], Mapping[str, Any] | None]
 
 
 def default_path() -> Path:
-    """Returns the default path of the socket, one per user and ROS domain."""
-    base = os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()
-    return Path(base) / f"simrobot-{os.getuid()}-{os.environ.get('ROS_DOMAIN_ID') or '0'}.sock"
+    """Returns the default path of the socket, one per user and ROS domain; its directory is this user's own.
+
+    Raises:
+        UserError: another user has made a directory or link of that name first, or it can't be made.
+    """
+    if session := os.environ.get("XDG_RUNTIME_DIR"):
+        directory = Path(session) / "simrobot"
+    else:
+        directory = Path(tempfile.gettempdir()) / f"simrobot-{os.getuid()}"
+    try:
+        make_own_directory(directory)
+    except OSError as error:
+        raise UserError(
+            f"{directory} can't be used: {error.strerror}", "Name another socket with --control"
+        ) from error
+    return directory / f"{os.environ.get('ROS_DOMAIN_ID') or '0'}.sock"
 
 
 @asynccontextmanager

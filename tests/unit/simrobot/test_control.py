@@ -8,8 +8,9 @@ import pytest
 
 from common.errors import ExitCode, UserError
 from simrobot.behaviour import Behaviour
-from simrobot.control import ask, ask_base, listening
+from simrobot.control import ask, ask_base, default_path, listening
 from simrobot.robot import Robot
+from tests.support.file_owner import files_belong_to
 
 
 def changes(robot: Robot) -> Any:
@@ -75,3 +76,40 @@ def test_a_missing_robot_is_one_line(tmp_path: Path) -> None:
         ask(tmp_path / "missing", {})
     assert refusal.value.exit_code is ExitCode.UNREACHABLE
     assert os.linesep not in str(refusal.value)
+
+
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The directory for temporary files, of a user without a session."""
+    monkeypatch.delenv("XDG_RUNTIME_DIR", raising=False)
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    return tmp_path
+
+
+def test_by_default_it_is_in_a_directory_of_this_users_own(
+    temporary: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = default_path()
+    assert path == temporary / f"simrobot-{os.getuid()}" / "0.sock"
+    assert path.parent.stat().st_mode & 0o7777 == 0o700
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(temporary / "session"))
+    monkeypatch.setenv("ROS_DOMAIN_ID", "7")
+    assert default_path() == temporary / "session" / "simrobot" / "7.sock"
+
+
+@pytest.mark.parametrize("placed", ["directory", "link"])
+def test_what_another_user_has_placed_there_is_not_used(
+    temporary: Path, monkeypatch: pytest.MonkeyPatch, placed: str
+) -> None:
+    """Who listens there would get the requests, and answer them."""
+    foreseen = temporary / f"simrobot-{os.getuid()}"
+    if placed == "link":
+        (temporary / "theirs").mkdir()
+        foreseen.symlink_to(temporary / "theirs")
+    else:
+        foreseen.mkdir()
+        files_belong_to(os.geteuid() + 1, monkeypatch)
+    with pytest.raises(UserError, match=f"{foreseen} can't be used") as refusal:
+        default_path()
+    assert "--control" in refusal.value.remedy
