@@ -143,6 +143,8 @@ class Guard:
                     STOPS: self._stops.as_json(),
                     KILLS: str(self._kills),
                 }
+                # Without common.child.end_with_parent: when this process is killed, the worker has the last
+                # word (zeros), and ends by itself because nothing reads its heartbeats.
                 worker = self._worker = subprocess.Popen(  # noqa: S603  # this program's own worker
                     self._command, env=environment, pass_fds=[theirs.fileno()]
                 )

@@ -50,7 +50,8 @@ def guarded_pulse(node: Any, settings: DriveSettings, config_file: Path | None) 
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with ours:
         with theirs:
-            # A group of its own: Ctrl-Z freezes the doctor alone.
+            # A group of its own: Ctrl-Z freezes the doctor alone. Without common.child.end_with_parent: when
+            # the doctor is killed, the pulse has to say zero, and ends as its heartbeats reach nothing.
             process = subprocess.Popen(  # noqa: S603  # this program itself
                 command,
                 env=os.environ | {HEARTBEATS: str(theirs.fileno())},
