@@ -16,7 +16,7 @@ from gateway.access.credential import Kind, Validity
 from gateway.access.credential_admin import CredentialAdmin, CredentialRequest
 from gateway.access.directory import CredentialDirectory
 from gateway.access.role import Role
-from gateway.access.store import Store
+from gateway.access.store import Store, parse_store
 
 NOW_S = 1_000_000.0
 
@@ -39,6 +39,21 @@ def test_changes_at_once_are_all_kept(admin: CredentialAdmin, tmp_path: Path) ->
     with ThreadPoolExecutor(8) as pool:
         list(pool.map(lambda name: admin.add(CredentialRequest(name, Role.VIEWER)), names))
     assert sorted(name for name, _ in states(tmp_path)) == sorted(names)
+
+
+def test_a_revocation_survives_a_power_loss(admin: CredentialAdmin, monkeypatch: pytest.MonkeyPatch) -> None:
+    admin.add(CredentialRequest("anna", Role.OPERATOR))
+    on_disk: list[tuple[str, str]] = []
+
+    def fsync(handle: int) -> None:
+        path = Path(f"/proc/self/fd/{handle}").readlink()
+        what, file = ("name", path / "credentials.json") if path.is_dir() else ("content", path)
+        (kept,) = parse_store(file.read_text()).credentials.values()
+        on_disk.append((what, kept.validity(NOW_S).value))
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    admin.revoke("anna")
+    assert on_disk == [("content", "revoked"), ("name", "revoked")]
 
 
 def test_a_rotated_token_replaces_the_old_one_now_or_later(admin: CredentialAdmin, tmp_path: Path) -> None:
