@@ -262,10 +262,11 @@ def _describe_stream(preview: preview_pb2.PreviewStatus) -> None:
 
 
 @contextmanager
-def serving(double: GatewayDouble, port: int = 0) -> Iterator[int]:
-    """Serves the double on 127.0.0.1 and yields the port; pings are allowed as by the real gateway."""
+def serving(double: GatewayDouble, port: int = 0, *more: grpc.GenericRpcHandler) -> Iterator[int]:
+    """Serves the double and `more` on 127.0.0.1; yields the port. Pings are allowed as by the real one."""
     with _server(port) as (server, bound):
         robot_gateway_pb2_grpc.add_RobotGatewayServicer_to_server(double, server)
+        server.add_generic_rpc_handlers(more)
         server.start()
         try:
             yield bound
