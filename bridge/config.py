@@ -9,6 +9,7 @@ from pydantic_settings import SettingsConfigDict
 from bridge.uploads.config import UploadSettings
 from common.config import Section, Settings
 from common.errors import UserError
+from common.socket_path import SocketPath
 from console.target import DEFAULT_TARGET, parse_target
 from fleet.names import ROBOT_NAME
 from fleet.servers import exposed_server
@@ -82,7 +83,7 @@ class BridgeSettings(Settings):
 
     model_config = SettingsConfigDict(env_prefix="BRIDGE__")
 
-    socket: Path = Path("/run/robot-gateway/bridge.sock")
+    socket: SocketPath = Path("/run/robot-gateway/bridge.sock")
     """Unix socket on which the gateway connects."""
     log_level: Literal["debug", "info", "warning", "error"] = "info"
     log_format: Literal["human", "json"] = "human"

@@ -14,9 +14,8 @@ import grpc
 
 from common.addresses import bracketed
 from common.errors import UserError
+from common.socket_path import MAX_SOCKET_PATH
 
-_MAX_SOCKET_PATH: Final = 107
-"""Longest path of a Unix socket in bytes: Linux's sun_path holds 108, with the final NUL (unix(7))."""
 _SOCKET_MODE: Final = 0o660
 _CONNECT_TIMEOUT_S: Final = 0.5
 
@@ -118,9 +117,9 @@ def _why_not(error: OSError, host: str, port: int) -> tuple[str, str]:
 
 
 def _try_unix(path: Path, kind: int = socket.SOCK_STREAM) -> None:
-    if len(bytes(path)) > _MAX_SOCKET_PATH:
+    if len(bytes(path)) > MAX_SOCKET_PATH:
         raise UserError(
-            f"the path of socket {path} has {len(bytes(path))} bytes; Linux takes {_MAX_SOCKET_PATH}",
+            f"the path of socket {path} has {len(bytes(path))} bytes; Linux takes {MAX_SOCKET_PATH}",
             "Choose a shorter path",
         )
     try:

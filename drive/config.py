@@ -9,6 +9,7 @@ from pydantic import Field
 from pydantic_settings import SettingsConfigDict
 
 from common.config import Section, Settings
+from common.socket_path import SocketPath
 from drive.inhibits import Deadlines
 from drive.machine import OnLoss, Rules
 from drive.shaping import Limits
@@ -77,7 +78,7 @@ class DriveSettings(Settings):
 
     model_config = SettingsConfigDict(env_prefix="DRIVE__")
 
-    socket: Path = Path("/run/robot-gateway/drive.sock")
+    socket: SocketPath = Path("/run/robot-gateway/drive.sock")
     """Unix socket on which the gateway connects."""
     log_level: Literal["debug", "info", "warning", "error"] = "info"
     log_format: Literal["human", "json"] = "human"

@@ -19,6 +19,7 @@ from pydantic_settings import SettingsConfigDict
 
 from common.camera_tap import MAX_TOPIC_CHARACTERS, is_topic
 from common.config import Section, Settings
+from common.socket_path import SocketPath
 from preview.encoders.catalogue import CATALOGUE, DEFAULT_ORDER, Encoder
 from preview.values import Codec, Profile, Target
 
@@ -221,7 +222,7 @@ class AdaptiveSettings(Section):
 class VideoTapSettings(Section):
     """Video tap: the encoder's output for the recorder, over a Unix socket."""
 
-    socket: Path | None = None
+    socket: SocketPath | None = None
     """Where the recorder connects. None: no tap."""
     floor_kbps: int = Field(default=1500, ge=50, le=MAX_BITRATE_KBPS)
     """Lower limit of the adaptive bit rate while a recorder is connected; at most the profile's bit rate."""
@@ -230,7 +231,7 @@ class VideoTapSettings(Section):
 class CameraTapSettings(Section):
     """Camera tap: the program that hands over the frames of ROS topics."""
 
-    socket: Path = Path("/run/robot-tap/tap.sock")
+    socket: SocketPath = Path("/run/robot-tap/tap.sock")
     """Where it serves; used for sources of kind `ros` alone."""
 
 
@@ -263,7 +264,7 @@ class PreviewSettings(Settings):
     model_config = SettingsConfigDict(env_prefix="PREVIEW__")
     spellings = MappingProxyType({each.value: each.name.lower() for each in Profile})
 
-    socket: Path = Path("/run/robot-gateway/preview.sock")
+    socket: SocketPath = Path("/run/robot-gateway/preview.sock")
     """Unix socket on which the gateway connects."""
     log_level: Literal["debug", "info", "warning", "error"] = "info"
     log_format: Literal["human", "json"] = "human"

@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from pydantic_settings import SettingsConfigDict
 
 from common.config import Section, Settings
+from common.socket_path import SocketPath
 
 MIB: Final = 1024 * 1024
 Pattern = Annotated[str, Field(max_length=255, pattern=r"^[/*][A-Za-z0-9_/*]*$")]
@@ -116,7 +117,7 @@ class SegmentSettings(Section):
 class VideoSettings(Section):
     """Where the video comes from."""
 
-    socket: Path | None = None
+    socket: SocketPath | None = None
     """The preview's video tap. None: recordings have no video."""
 
 
@@ -132,7 +133,7 @@ class RecorderSettings(Settings):
 
     model_config = SettingsConfigDict(env_prefix="RECORDER__")
 
-    socket: Path = Path("/run/robot-gateway/recorder.sock")
+    socket: SocketPath = Path("/run/robot-gateway/recorder.sock")
     """Unix socket on which the gateway connects."""
     log_level: Literal["debug", "info", "warning", "error"] = "info"
     log_format: Literal["human", "json"] = "human"

@@ -8,6 +8,7 @@ from pydantic_settings import SettingsConfigDict
 
 from common.config import Settings
 from common.metrics_settings import MetricsSettings, check_metrics
+from common.socket_path import SocketPath
 
 MAX_FPS = 120
 
@@ -17,7 +18,7 @@ class TapSettings(Settings):
 
     model_config = SettingsConfigDict(env_prefix="TAP__")
 
-    socket: Path = Path("/run/robot-tap/tap.sock")
+    socket: SocketPath = Path("/run/robot-tap/tap.sock")
     """Unix socket on which the preview connects."""
     log_level: Literal["debug", "info", "warning", "error"] = "info"
     log_format: Literal["human", "json"] = "human"

@@ -5,13 +5,14 @@ from pathlib import Path
 from pydantic import Field
 
 from common.config import Section
+from common.socket_path import SocketPath
 from gateway.status.cloud import HubAction
 
 
 class PreviewSettings(Section):
     """The connection to the preview service, and from viewers to its stream."""
 
-    socket: Path = Path("/run/robot-gateway/preview.sock")
+    socket: SocketPath = Path("/run/robot-gateway/preview.sock")
     settle_ms: int = Field(default=4000, ge=0, le=60_000)
     """How long SetPreviewMode waits for the requested state before it returns the present one."""
     advertised_host: str | None = Field(default=None, min_length=1)
@@ -24,7 +25,7 @@ class PreviewSettings(Section):
 class TeleopSettings(Section):
     """The connection to the drive program, and who may drive how."""
 
-    socket: Path | None = None
+    socket: SocketPath | None = None
     """Unix socket of robot-drive; None, the default, is a gateway through which no one can drive."""
     enabled_at_start: bool = True
     """Whether driving is enabled when the gateway starts; SetTeleopEnabled changes it."""
@@ -39,14 +40,14 @@ class TeleopSettings(Section):
 class RecordingSettings(Section):
     """The connection to the recorder."""
 
-    socket: Path | None = None
+    socket: SocketPath | None = None
     """Unix socket of robot-recorder; None, the default, is a robot that is not set up for recording."""
 
 
 class BridgeSettings(Section):
     """The connection to the bridge, and what the fleet's hub may request of this robot."""
 
-    socket: Path | None = None
+    socket: SocketPath | None = None
     """Unix socket of robot-bridge; None, the default, is a robot that is not set up for a fleet."""
     allowed_requests: tuple[HubAction, ...] = Field(default=(), max_length=len(HubAction))
     """What the gateway carries out for the hub; nothing by default. The bridge has a list of its own."""

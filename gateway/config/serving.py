@@ -1,11 +1,11 @@
 """`grpc`, `limits`, `discovery`: where the gateway serves, and how much it serves to one caller."""
 
 import ipaddress
-from pathlib import Path
 
 from pydantic import Field, field_validator
 
 from common.config import Section
+from common.socket_path import SocketPath
 
 
 class GrpcSettings(Section):
@@ -14,7 +14,7 @@ class GrpcSettings(Section):
     host: str = Field(default="127.0.0.1", min_length=1)
     port: int = Field(default=50051, ge=0, le=65535)
     """0 takes any free port, which the log names."""
-    socket: Path | None = None
+    socket: SocketPath | None = None
     """Additional Unix socket for health checks on this machine. Unencrypted; methods other than those of the
     health service require a credential there, too."""
 

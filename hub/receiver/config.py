@@ -8,6 +8,7 @@ from pydantic_settings import SettingsConfigDict
 
 from common.config import Section, Settings
 from common.metrics_settings import MetricsSettings, check_metrics
+from common.socket_path import SocketPath
 from fleet.servers import exposed_server
 
 _Name = Annotated[str, Field(pattern=r"^[a-z0-9]([a-z0-9-]{0,61}[a-z0-9])?$")]
@@ -65,7 +66,7 @@ class ReceiverSettings(Settings):
     """receipts.pub of the hub, where other keys have signed before. None: the signing key's own."""
     keep_parts_days: int = Field(default=7, ge=1, le=365)
     """Parts of an upload that was begun so long ago, and not completed, are deleted."""
-    socket: Path = Path("/run/robot-receiver/receiver.sock")
+    socket: SocketPath = Path("/run/robot-receiver/receiver.sock")
     """Unix socket of the health service."""
     metrics: MetricsSettings = MetricsSettings()
     log_level: Literal["debug", "info", "warning", "error"] = "info"

@@ -46,7 +46,11 @@ def test_check_says_what_it_found_good(config: Path) -> None:
 @pytest.mark.parametrize("command", ["check", "serve"])
 @pytest.mark.parametrize(
     ("text", "words"),
-    [("grcp: {port: 1}", "unknown key 'grcp'"), ("grpc: {host: 0.0.0.0}", "security: {insecure: true}")],
+    [
+        ("grcp: {port: 1}", "unknown key 'grcp'"),
+        ("grpc: {host: 0.0.0.0}", "security: {insecure: true}"),
+        (f"sources: []\ngrpc: {{port: 0, socket: /{'x' * 107}}}", "a path of at most 107 bytes"),
+    ],
 )
 def test_a_wrong_configuration_ends_with_one_line_and_2(
     tmp_path: Path, command: str, text: str, words: str

@@ -50,6 +50,7 @@ def one_line(result: subprocess.CompletedProcess[str], code: int, *words: str) -
         ("source: {kind: v4l2}", ("name either the device", "or the card")),
         ("source: {kind: telescope}", ("source", "telescope", "v4l2")),
         ("profiles: {balanced: {floor_kbps: 9000}}", ("floor_kbps must not be above bitrate_kbps",)),
+        (f"socket: /{'x' * 107}", ("line 1: key 'socket' is", "a path of at most 107 bytes")),
         ("- a list", ("list",)),
     ],
 )

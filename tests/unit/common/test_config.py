@@ -10,15 +10,11 @@ import pytest
 from pydantic import BaseModel, Field
 from pydantic_settings import SettingsConfigDict
 
-from bridge.config import BridgeSettings
 from common.config import Section, Settings, as_yaml, json_schema, load
 from common.errors import ExitCode, UserError
-from drive.config import DriveSettings
 from gateway.config import GatewaySettings
-from hub.receiver.config import ReceiverSettings
 from preview.config import PreviewSettings
-from recorder.config import RecorderSettings
-from tap.config import TapSettings
+from tests.support.program_settings import PROGRAMS, refusal_of
 
 
 class _Item(Section):
@@ -166,17 +162,6 @@ def test_no_mistake_is_explained_in_the_librarys_words(settings_type: type[Setti
     assert [each for each in sentences if library.search(each)] == []
 
 
-PROGRAMS: Final = (
-    GatewaySettings,
-    PreviewSettings,
-    RecorderSettings,
-    DriveSettings,
-    BridgeSettings,
-    ReceiverSettings,
-    TapSettings,
-)
-
-
 def leaves_of(model: type[BaseModel]) -> Iterator[tuple[tuple[str, ...], Any]]:
     """The keys that hold no section, with what they take."""
     for name, field in model.model_fields.items():
@@ -185,16 +170,6 @@ def leaves_of(model: type[BaseModel]) -> Iterator[tuple[tuple[str, ...], Any]]:
             yield from (((field.alias or name, *inner), kind) for inner, kind in leaves_of(annotation))
         else:
             yield (field.alias or name,), annotation
-
-
-def refusal_of(settings_type: type[Settings], keys: tuple[str, ...], value: Any, file: Path) -> str:
-    values: Any = value
-    for key in reversed(keys):
-        values = {key: values}
-    file.write_text(json.dumps(values), encoding="utf-8")
-    with pytest.raises(UserError) as raised:
-        load(settings_type, file)
-    return raised.value.what
 
 
 @pytest.mark.parametrize("settings_type", PROGRAMS)
