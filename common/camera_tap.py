@@ -35,7 +35,9 @@ MAX_FRAME_BYTES: Final = 32 << 20
 LEAST_SEALS: Final = 0x0002 | 0x0008
 """F_SEAL_SHRINK and F_SEAL_WRITE (fcntl.h): a memfd that shrinks under a mapping would end the reader with
 SIGBUS, and one that changes could become another picture between a decoder's looks at size and content."""
-_TOPIC: Final = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
+TOPIC_PATTERN: Final = r"(/[A-Za-z_][A-Za-z0-9_]*)+"
+"""Regular expression of a whole name."""
+_TOPIC: Final = re.compile(TOPIC_PATTERN)
 MAX_TOPIC_CHARACTERS: Final = 255
 
 PACKED: Final[Mapping[str, int]] = MappingProxyType(

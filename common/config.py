@@ -21,9 +21,12 @@ from common.errors import ExitCode, UserError
 
 
 class Section(BaseModel):
-    """One section of a configuration file. Unknown keys are errors; values are immutable."""
+    """One section of a configuration file. Unknown keys are errors; values are immutable.
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    The text below a key explains it in the JSON schema, too.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
 
 class Settings(BaseSettings):
@@ -40,6 +43,7 @@ class Settings(BaseSettings):
         # Compose files can't leave a variable out, only leave it empty.
         env_ignore_empty=True,
         nested_model_default_partial_update=True,
+        use_attribute_docstrings=True,
     )
     spellings: ClassVar[Mapping[str, str]] = {}
     """Keys of a file that Python spells in another way, as environment variables do."""

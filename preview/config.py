@@ -17,7 +17,7 @@ from pydantic import (
 )
 from pydantic_settings import SettingsConfigDict
 
-from common.camera_tap import MAX_TOPIC_CHARACTERS, is_topic
+from common.camera_tap import MAX_TOPIC_CHARACTERS, TOPIC_PATTERN, is_topic
 from common.config import Section, Settings
 from common.socket_path import SocketPath
 from preview.encoders.catalogue import CATALOGUE, DEFAULT_ORDER, Encoder
@@ -89,7 +89,8 @@ class RosSource(AnySource):
     """Image topic of the robot's ROS 2 graph, by way of the camera tap (`robot-tap`)."""
 
     kind: Literal["ros"] = "ros"
-    topic: str = Field(max_length=MAX_TOPIC_CHARACTERS)
+    # The pattern for editors: the validator has a sentence for people.
+    topic: str = Field(max_length=MAX_TOPIC_CHARACTERS, json_schema_extra={"pattern": f"^{TOPIC_PATTERN}$"})
     """Full name of a topic of sensor_msgs/msg/Image or CompressedImage."""
     fps: int | None = Field(default=None, gt=0, le=MAX_FPS)
     """What the camera publishes, for the encoder, which shares its bits out by it. None: at least the rate of
@@ -175,7 +176,9 @@ class SrtSettings(Section):
 class EncoderSettings(Section):
     """Which encoders may be used, in order of preference."""
 
-    order: tuple[str, ...] = Field(default=DEFAULT_ORDER, min_length=1)
+    order: tuple[Annotated[str, Field(json_schema_extra={"enum": [*CATALOGUE]})], ...] = Field(
+        default=DEFAULT_ORDER, min_length=1
+    )
     codec: Literal["any", "h264", "h265"] = "any"
     """Restricts the choice: older viewers decode H.264 only."""
     key_frame_interval_s: float = Field(default=2.0, gt=0, le=30)

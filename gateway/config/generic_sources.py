@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import AfterValidator
+from pydantic import AfterValidator, Field
 
 from gateway.config.faults import LowerLimit, UpperLimit
 from gateway.status.fault import Severity
@@ -54,7 +54,11 @@ def _printable(longest: int) -> AfterValidator:
     return AfterValidator(check)
 
 
-FieldPath = Annotated[str, AfterValidator(_path)]
+FieldPath = Annotated[
+    str,
+    AfterValidator(_path),
+    Field(json_schema_extra={"pattern": f"^{_PATH.pattern}$", "maxLength": _LONGEST_PATH}),
+]
 """Names of fields with points between them; an index in brackets chooses an item of a list."""
 Title = Annotated[str, _printable(_LONGEST_TITLE)]
 Unit = Annotated[str, _printable(_LONGEST_UNIT)]

@@ -13,6 +13,7 @@ class PreviewSettings(Section):
     """The connection to the preview service, and from viewers to its stream."""
 
     socket: SocketPath = Path("/run/robot-gateway/preview.sock")
+    """Unix socket of robot-preview."""
     settle_ms: int = Field(default=4000, ge=0, le=60_000)
     """How long SetPreviewMode waits for the requested state before it returns the present one."""
     advertised_host: str | None = Field(default=None, min_length=1)

@@ -64,13 +64,24 @@ def _type_name(name: str) -> str:
 class SourceSettings(Section):
     """One ROS 2 topic."""
 
-    kind: Annotated[str, AfterValidator(_known_kind)]
+    # The schema repeats what the validators check: editors complete by it, and the validators' sentences are
+    # for people.
+    kind: Annotated[str, AfterValidator(_known_kind), Field(json_schema_extra={"enum": [*KINDS]})]
+    """What its values are."""
     label: str | None = None
     """Tells sources of one kind apart: the input of the command mux, or the name of a generic value."""
     title: Title = ""
     """Name of a generic value for operators; by default its label with blanks."""
-    topic: Annotated[str, AfterValidator(_topic_name)]
-    type: Annotated[str, AfterValidator(_type_name)]
+    topic: Annotated[
+        str,
+        AfterValidator(_topic_name),
+        Field(json_schema_extra={"pattern": f"^{_TOPIC.pattern}$", "maxLength": _LONGEST_TOPIC}),
+    ]
+    """Name of the topic, /odometry/filtered for example."""
+    type: Annotated[
+        str, AfterValidator(_type_name), Field(json_schema_extra={"pattern": f"^{_TYPE.pattern}$"})
+    ]
+    """Type of its messages, nav_msgs/msg/Odometry for example."""
     field: FieldPath | None = None
     """The field of the message that a generic value is."""
     tile: bool = False

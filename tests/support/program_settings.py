@@ -38,13 +38,18 @@ NEEDED: Final[Mapping[type[Settings], Mapping[str, Any]]] = {
 """What a file of a program must have."""
 
 
+def file_with(settings_type: type[Settings], values: Mapping[str, Any], file: Path) -> Path:
+    """Writes a file with these values and those that the program needs."""
+    file.write_text(json.dumps({**NEEDED.get(settings_type, {}), **values}), encoding="utf-8")
+    return file
+
+
 def refusal_of(settings_type: type[Settings], keys: tuple[str, ...], value: Any, file: Path) -> str:
-    """What a program says of a file with this value and what it needs, which it must refuse."""
+    """What a program says of a file with this value, which it must refuse."""
     values: Any = value
     for key in reversed(keys):
         values = {key: values}
-    file.write_text(json.dumps({**NEEDED.get(settings_type, {}), **values}), encoding="utf-8")
     with pytest.raises(UserError) as raised:
-        load(settings_type, file)
+        load(settings_type, file_with(settings_type, values, file))
     assert raised.value.exit_code is ExitCode.USAGE
     return raised.value.what
