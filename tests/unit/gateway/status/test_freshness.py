@@ -1,10 +1,13 @@
 """Freshness and health against the plainest model of the same rules."""
 
-from typing import Any
+from typing import Any, Final
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gateway.config import GatewaySettings
+from gateway.config.sources import KINDS, SourceSettings
 from gateway.status.board import Board
 from gateway.status.freshness import NEVER, Freshness, sample
 from gateway.status.health import HealthState, RobotHealth, assess
@@ -93,3 +96,42 @@ def test_health_follows_the_contract_line_by_line(
 
 def test_a_robot_without_both_sources_is_healthy() -> None:
     assert assess([]) == RobotHealth(HealthState.OK, "robot healthy", ready=True)
+
+
+WITH_LABELS: Final = {
+    "mux_input": {"label": "keyboard"},
+    "number": {"label": "motor_temperature", "field": "a"},
+    "text": {"label": "gripper", "field": "a"},
+}
+NAMES: Final = {
+    "vision": "vision telemetry",
+    "effective_command": "effective command",
+    "mux_input": "commands of keyboard",
+    "number": "motor temperature",
+    "text": "gripper",
+}
+"""Of sources in the summary, where it is not the kind."""
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("required", [True, False])
+@pytest.mark.parametrize(("age_ms", "verdict"), [(None, "waiting for {}"), (999, ""), (1001, "{} stale")])
+def test_a_required_source_of_any_kind_decides(
+    kind: str, required: bool, age_ms: int | None, verdict: str
+) -> None:
+    more = WITH_LABELS.get(kind, {})
+    source = SourceSettings.model_validate(
+        {"kind": kind, "topic": "/a", "type": "n/msg/O", "stale_after_ms": 1000, "required": required, **more}
+    )
+    rules = GatewaySettings(sources=(source,)).status_rules()
+    board, now_s = Board(), 1000.0
+    if age_ms is not None:
+        # Half a millisecond off, as above. No source's value says anything about its age.
+        board[source.spec] = Received(Velocity(0, 0, 0), now_s - (age_ms + 0.5) / 1000)
+
+    health = snapshot_of(board, rules=rules, now_s=now_s).health
+
+    expected = verdict.format(NAMES.get(kind, kind)) if required else ""
+    assert health.summary == (expected or "robot healthy")
+    assert health.ready == (not expected)
+    assert (health.state is HealthState.OK) == (not expected)
