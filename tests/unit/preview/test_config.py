@@ -1,5 +1,6 @@
 """The settings, and the catalogue they name."""
 
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -39,6 +40,30 @@ def test_a_source_replaces_the_default_whole(tmp_path: Path) -> None:
 def test_one_figure_of_a_profile_may_be_changed(tmp_path: Path) -> None:
     low = from_text(tmp_path, "profiles: {low_bw: {bitrate_kbps: 700}}").profiles.low_bw
     assert (low.bitrate_kbps, low.fps, low.floor_kbps) == (700, 15, 300)
+
+
+def test_a_computer_without_a_hardware_encoder_wants_the_one_in_software(tmp_path: Path) -> None:
+    """As the gateway proposes (preview.fallback) and the documents do."""
+    settings = from_text(tmp_path, "encoders: {order: [x264]}")
+    assert [encoder.name for encoder in settings.encoders.allowed] == ["x264"]
+
+
+def test_two_previews_of_one_machine_have_a_directory_each(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each finds its own crash marker there, wherever the port comes from; one that is configured stays."""
+    for run in (None, tmp_path / "run"):
+        monkeypatch.delenv("XDG_RUNTIME_DIR", raising=False)
+        if run:
+            monkeypatch.setenv("XDG_RUNTIME_DIR", str(run))
+        monkeypatch.delenv("PREVIEW__SRT__PORT", raising=False)
+        first, second = (from_text(tmp_path, f"srt: {{port: {port}}}").runtime_dir for port in (7100, 7200))
+        assert first != second
+        assert first.parent == second.parent == (run or Path(tempfile.gettempdir()))
+        assert from_text(tmp_path, "{}").runtime_dir == first, "7100 is the default"
+        monkeypatch.setenv("PREVIEW__SRT__PORT", "7200")
+        assert from_text(tmp_path, "srt: {port: 7100}").runtime_dir == second
+        assert from_text(tmp_path, "runtime_dir: /run/mine").runtime_dir == Path("/run/mine")
 
 
 def test_a_codec_restricts_the_order() -> None:

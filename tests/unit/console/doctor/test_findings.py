@@ -107,9 +107,15 @@ def test_one_condition_is_one_finding(double: GatewayDouble, *, faulted: bool) -
 
 def test_an_encoder_in_software_is_a_note(double: GatewayDouble) -> None:
     double.status.faults.add(
-        id="preview.fallback", active=True, severity=FAULT_SEVERITY_WARNING, message="x264 encodes"
+        id="preview.fallback",
+        active=True,
+        severity=FAULT_SEVERITY_WARNING,
+        message="x264 encodes",
+        remedy="No hardware encoder here? Set encoders.order: [x264]",
     )
-    assert examined(double)["fault.preview.fallback"].verdict is Verdict.NOTE
+    finding = examined(double)["fault.preview.fallback"]
+    assert finding.verdict is Verdict.NOTE
+    assert finding.remedy == "No hardware encoder here? Set encoders.order: [x264]"
 
 
 def test_a_cleared_fault_is_not_reported(double: GatewayDouble) -> None:

@@ -366,6 +366,23 @@ def test_another_encoder_than_the_wanted_one_is_a_fault_that_names_both() -> Non
         assert part in fault.message
 
 
+@pytest.mark.parametrize(
+    ("encoder", "remedy"),
+    [
+        (
+            Encoder("x264", False, "mpp-h265", "no device"),
+            "No hardware encoder here? Set encoders.order: [x264] in the preview's configuration. "
+            "Else type on the robot: robot-preview encoders",
+        ),
+        (Encoder("va-h264", True, "va-h265", "no device"), "Type on the robot: robot-preview encoders"),
+    ],
+)
+def test_the_way_to_the_wanted_encoder_or_without_one(encoder: Encoder, remedy: str) -> None:
+    """A computer without a hardware encoder keeps the fault until its owner says that it has none."""
+    running = replace(OFF, state=PreviewState.RUNNING, encoder=encoder)
+    assert found(snapshot(board(), running))["preview.fallback"].remedy == remedy
+
+
 def test_a_wanted_camera_that_fails_is_a_fault_that_says_what_is_shown() -> None:
     cameras = (Camera("front", CameraState.FAILED, "it has ended"), Camera("rear", CameraState.LIVE))
     running = replace(OFF, state=PreviewState.RUNNING, wanted_camera="front", cameras=cameras)
