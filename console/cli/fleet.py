@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 import typer
 
 from common.errors import ExitCode, UserError
+from console.cli.export_options import naming_export_options
 from console.cli.fleet_events import events
 from console.cli.fleet_session import FleetSession, HubUnreachableError, with_fleet
 from console.cli.fleet_tables import answer_line, fleet_view, recordings_table, robot_view
@@ -257,7 +258,7 @@ async def _get(
         # Where there is no receiver, that is said at once; one that is lost later is waited for.
         await urls.url(found.files[0].name)
         transport = StoreTransport({file.name: file for file in found.files}, urls, tls)
-        with TransferBar(session.out, shown=not session.as_json) as bar:
+        with TransferBar(session.out, shown=not session.as_json) as bar, naming_export_options():
             return await Export(
                 transport, found, folder, ExportOptions(resume=resume, progress=bar.show_export)
             ).run()

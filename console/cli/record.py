@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from common.errors import ExitCode, UserError
+from console.cli.export_options import naming_export_options
 from console.cli.session import Session, print_json, with_session
 from console.cli.tables import grid
 from console.cli.transfer_bar import TransferBar
@@ -282,7 +283,7 @@ async def _export(session: Session, recording_id: str, to: Path, *, resume: bool
     async with session.connect_async() as client:
         found = await client.recording(recording_id)
         folder = path_below(to, found.id)
-        with TransferBar(session.out, shown=not session.as_json) as bar:
+        with TransferBar(session.out, shown=not session.as_json) as bar, naming_export_options():
             done = await client.export_recording(
                 found,
                 folder,

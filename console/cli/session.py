@@ -12,12 +12,13 @@ from typing import Any, Protocol
 import typer
 from rich.console import Console, RenderableType
 
+from common.errors import UserError
 from common.printable import escaped
 from console.cli.options import GlobalOptions, JsonOption, RobotOption, TargetOption, json_requested
 from console.client import AsyncGatewayClient, GatewayClient
 from console.credentials import Credentials
 from console.presentation.json_form import json_form
-from console.robots import Robot, choose, read_credentials, read_robots_file
+from console.robots import NotChosenError, Robot, choose, read_credentials, read_robots_file
 from console.target import parse_target
 
 # In a pipe or a file long lines are better than broken ones.
@@ -103,10 +104,14 @@ def session_of(
     """Returns a session on standard output. An option after the command's name overrides one before it.
 
     Raises:
-        UserError: No robot has this name, or the file of known robots is wrong.
+        UserError: No robot has this name, none is chosen, or the file of known robots is wrong.
     """
     before: GlobalOptions = context.obj
-    chosen, name = choose(target or before.target, robot or before.robot, os.environ)
+    try:
+        chosen, name = choose(target or before.target, robot or before.robot, os.environ)
+    except NotChosenError as error:
+        remedy = "Add --robot NAME, or type: robotctl robots default NAME"
+        raise UserError(error.what, remedy, exit_code=error.exit_code) from error
     return Session(chosen, json_requested(context, as_json), standard_output(), name)
 
 

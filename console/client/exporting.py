@@ -158,6 +158,10 @@ class _Partial:
         os.fsync(self.stream.fileno())
 
 
+class FolderTakenError(UserError):
+    """The folder of an export that does not resume an earlier one is there already."""
+
+
 class Export:
     """One copy of a recording.
 
@@ -191,14 +195,15 @@ class Export:
 
         Raises:
             GatewayError: The robot refuses or can't be reached, or a file can't be verified.
-            UserError: The folder is there already, or can't be written.
+            FolderTakenError: The folder is there already.
+            UserError: It can't be written.
         """
         # All names, before the first byte is written.
         paths = [path_below(self._folder, each.name) for each in self._files]
         if not self._options.resume and self._folder.exists():
-            raise UserError(
+            raise FolderTakenError(
                 f"{self._folder} is there already",
-                "Go on with what an earlier export has left (--resume), or choose another folder (--to)",
+                "Resume what an earlier export has left, or choose another folder",
             )
         try:
             for number, (file, path) in enumerate(zip(self._files, paths, strict=True), start=1):
@@ -207,7 +212,7 @@ class Export:
         except OSError as error:
             raise UserError(
                 f"{error.filename or self._folder} can't be written: {error.strerror or error}",
-                "Free space there, or choose another folder (--to); what was received stays",
+                "Free space there, or choose another folder; what was received stays",
             ) from None
         return ExportedRecording(
             folder=self._folder,
@@ -249,7 +254,7 @@ class Export:
         if digest != file.sha256:
             raise UserError(
                 f"{path} is there already, with other content than the robot's",
-                "Move it away, or choose another folder (--to)",
+                "Move it away, or choose another folder",
             )
 
     async def _take_present(self, partial: _Partial, file: RecordingFile) -> None:

@@ -60,7 +60,7 @@ def unresolved(address: StreamAddress, error: OSError) -> StreamError:
     """Returns the error of a host without an address."""
     return StreamRefusedError(
         f"no stream from {address.uri}: the name does not resolve: {error.strerror or error}",
-        f"Use the robot's address instead (--target ADDRESS), or type: getent hosts {address.host}",
+        f"Use the robot's address instead of its name, or type: getent hosts {address.host}",
     )
 
 

@@ -12,6 +12,10 @@ TARGET_VARIABLE: Final = "ROBOTCTL_TARGET"
 ROBOT_VARIABLE: Final = "ROBOTCTL_ROBOT"
 
 
+class NotChosenError(UserError):
+    """Robots are known, and nothing says which one is meant."""
+
+
 def choose(
     target: str | None,
     name: str | None,
@@ -31,7 +35,8 @@ def choose(
         read: Reads the file.
 
     Raises:
-        UserError: No robot has this name, the file is wrong, or it has robots but no default.
+        NotChosenError: The file has robots but no default.
+        UserError: No robot has this name, or the file is wrong.
     """
     if name:
         robot = read().find(name)
@@ -43,9 +48,9 @@ def choose(
         return known.find(chosen), chosen
     if known.robots:
         # Localhost would be another robot than any of these.
-        raise UserError(
+        raise NotChosenError(
             f"no robot is chosen, and none of {', '.join(known.robots)} is the default",
-            "Add --robot NAME, or type: robotctl robots default NAME",
+            "Name one of them, or type: robotctl robots default NAME",
             exit_code=ExitCode.USAGE,
         )
     return Robot(target=DEFAULT_TARGET), None

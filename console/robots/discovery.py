@@ -88,7 +88,7 @@ class Discovery:
         except OSError as error:
             raise UserError(
                 f"this computer can't search its networks: {error.strerror or error}",
-                "Name the robot's address: --target HOST:PORT",
+                "Use the robot's address, HOST:PORT",
             ) from error
         self._browser = ServiceBrowser(self._zeroconf, SERVICE_TYPE, handlers=[self._on_change])
 

@@ -147,7 +147,7 @@ def read_text(path: Path) -> str:
         reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
         raise UserError(
             f"{path} can't be read: {reason}",
-            "Correct the file, or name the robot with --target",
+            "Correct the file, or use the robot's address instead of its name",
             exit_code=ExitCode.USAGE,
         ) from error
 

@@ -126,6 +126,7 @@ async def test_what_the_robot_recorded_is_on_this_computer(ground: Ground, lapto
         refused = await laptop.get()
         assert refused.returncode == 1
         assert "is there already" in refused.stderr
+        assert "(--resume)" in refused.stderr
         again = await laptop.got("--resume")
         assert again["received"] == 0
         # Whoever has changed it here keeps it.
