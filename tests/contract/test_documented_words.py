@@ -9,18 +9,31 @@ import pytest
 import typer
 from typer.core import TyperGroup
 
+from bridge.cli import app as bridge_app
 from console.cli.app import command_line
 from console.cli.lazy import LazyCommand
+from drive.cli import app as drive_app
 from gateway.cli import app as gateway_app
+from hub.cli import app as hub_app
 from preview.cli import app as preview_app
+from recorder.cli import app as recorder_app
 from simrobot.cli import app as simrobot_app
-from tests.support.documented_commands import PAGES as COMMAND_PAGES
+from tap.cli import app as tap_app
 from tests.support.documented_commands import ROOT, blocks
 
 PAGES = sorted(path.relative_to(ROOT) for path in [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 HISTORY = Path("CHANGELOG.md")
 SPAN = re.compile(r"`([^`\n]+)`")
-PROGRAM = re.compile(r"(?<![\w/.-])(robotctl|robot-gateway|robot-preview|simrobot) ([^|;&<>()\n]*)")
+APPS = {
+    "robot-bridge": bridge_app,
+    "robot-drive": drive_app,
+    "robot-gateway": gateway_app,
+    "robot-preview": preview_app,
+    "robot-recorder": recorder_app,
+    "robot-tap": tap_app,
+    "simrobot": simrobot_app,
+}
+PROGRAM = re.compile(rf"(?<![\w/.-])(robotctl|{'|'.join(APPS)}) ([^|;&<>()\n]*)")
 WORD = re.compile(r"[a-z][a-z-]+")
 
 
@@ -28,8 +41,14 @@ WORD = re.compile(r"[a-z][a-z-]+")
 def program(name: str) -> Any:
     if name == "robotctl":
         return command_line()
-    app = {"robot-gateway": gateway_app, "robot-preview": preview_app, "simrobot": simrobot_app}[name]
-    return typer.main.get_command(app)
+    command = typer.main.get_command(APPS[name])
+    if name == "robot-bridge":
+        # It passes these words on to the hub's administration, which a robot does not have.
+        hub = typer.main.get_command(hub_app)
+        assert isinstance(command, TyperGroup)
+        assert isinstance(hub, TyperGroup)
+        command.commands.update(hub=hub, enroll=hub.commands["enroll"])
+    return command
 
 
 def options(command: Any) -> set[str]:
@@ -57,14 +76,14 @@ def problem(name: str, words: list[str]) -> str:
 def documented(page: Path) -> list[tuple[str, list[str]]]:
     text = (ROOT / page).read_text(encoding="utf-8")
     spans = SPAN.findall(text)
-    pasted: list[str] = []
-    if str(page) in COMMAND_PAGES:
-        commands = [block for block in blocks(str(page)) if "synopsis" not in block.reason]
-        pasted = [line for block in commands for line in block.text.splitlines()]
+    commands = [block for block in blocks(str(page)) if "synopsis" not in block.reason]
+    pasted = [line for block in commands for line in block.text.splitlines()]
     found = []
     for source in (*spans, *(line.partition(" #")[0] for line in pasted)):
-        for name, rest in PROGRAM.findall(source.replace("\\|", "|")):
-            found.append((name, rest.split()))
+        text = source.replace("\\|", "|")
+        # To systemctl the names are units, which have no commands.
+        if "systemctl" not in text:
+            found += [(name, rest.split()) for name, rest in PROGRAM.findall(text)]
     return found
 
 
@@ -93,4 +112,6 @@ def test_what_does_not_exist_is_noticed() -> None:
     assert problem("robotctl", ["statsu"])
     assert problem("robotctl", ["preview", "on", "--bandwidth", "low"])
     assert problem("robot-gateway", ["credentials", "ad"])
+    assert problem("robot-bridge", ["hub", "enrol"])
+    assert problem("robot-drive", ["doctor", "--puls"])
     assert not problem("robotctl", ["--robot", "lab2", "preview", "on", "--profile", "low-bw"])
