@@ -4,12 +4,13 @@ from pydantic import Field
 
 from common.addresses import is_loopback
 from common.config import Section, SettingsConflictError
+from common.listen_host import ListenHost
 
 
 class MetricsSettings(Section):
     """The Prometheus endpoint: unencrypted and without authentication."""
 
-    host: str = Field(default="127.0.0.1", min_length=1, max_length=255)
+    host: ListenHost = "127.0.0.1"
     port: int | None = Field(default=None, ge=0, le=65535)
     """None disables it; 0 takes any free port, which the log names."""
     insecure: bool = False

@@ -5,13 +5,14 @@ import ipaddress
 from pydantic import Field, field_validator
 
 from common.config import Section
+from common.listen_host import ListenHost
 from common.socket_path import SocketPath
 
 
 class GrpcSettings(Section):
     """The address for operators."""
 
-    host: str = Field(default="127.0.0.1", min_length=1)
+    host: ListenHost = "127.0.0.1"
     port: int = Field(default=50051, ge=0, le=65535)
     """0 takes any free port, which the log names."""
     socket: SocketPath | None = None

@@ -50,6 +50,8 @@ def test_check_says_what_it_found_good(config: Path) -> None:
         ("grcp: {port: 1}", "unknown key 'grcp'"),
         ("grpc: {host: 0.0.0.0}", "security: {insecure: true}"),
         (f"sources: []\ngrpc: {{port: 0, socket: /{'x' * 107}}}", "a path of at most 107 bytes"),
+        ("sources: []\ngrpc: {port: 0, host: '[::1]'}", "a host name or an address, 127.0.0.1 or ::1"),
+        (f"sources: []\nmetrics: {{port: 0, host: {'a' * 64}, insecure: true}}", "a host name or an address"),
     ],
 )
 def test_a_wrong_configuration_ends_with_one_line_and_2(
