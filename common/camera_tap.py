@@ -38,7 +38,8 @@ SIGBUS, and one that changes could become another picture between a decoder's lo
 TOPIC_PATTERN: Final = r"(/[A-Za-z_][A-Za-z0-9_]*)+"
 """Regular expression of a whole name."""
 _TOPIC: Final = re.compile(TOPIC_PATTERN)
-MAX_TOPIC_CHARACTERS: Final = 255
+MAX_TOPIC_CHARACTERS: Final = 247
+"""RMW_TOPIC_MAX_NAME_LENGTH."""
 
 PACKED: Final[Mapping[str, int]] = MappingProxyType(
     {

@@ -17,7 +17,8 @@ from drive.values import MS
 
 _DEFAULT: Final = Limits()
 VelocityType = Literal["geometry_msgs/msg/TwistStamped", "geometry_msgs/msg/Twist"]
-Topic = Annotated[str, Field(max_length=255, pattern=r"^/[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$")]
+Topic = Annotated[str, Field(max_length=247, pattern=r"^/[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$")]
+"""Full name of a topic; of 247 characters at the most (RMW_TOPIC_MAX_NAME_LENGTH)."""
 
 
 class Output(Section):
