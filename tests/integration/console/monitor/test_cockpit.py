@@ -42,6 +42,7 @@ pytestmark = pytest.mark.gst
 WINDOW = (1280, 800)
 CLOSED_SHARE, OPEN_SHARE = 0.80, 0.50
 """Least share of the window's pixels that are the picture's own."""
+PANEL_PX = 300
 CTRL = Qt.KeyboardModifier.ControlModifier
 OTHER = RobotChoice("lab2", "10.0.0.2:50051", known=True)
 FOUND = RobotChoice("arm & hand", "10.0.0.3:50051", known=False)
@@ -64,7 +65,7 @@ class Cockpit:
         let_pass(0.3)
 
     def share(self) -> float:
-        """Of the window's pixels, those of the picture, counted on the screen."""
+        """The share of the window within the box that the picture is painted in, which must be in sight."""
         image = self.window.grab().toImage()
         box = self.window.video.frame_box()
         origin = self.window.video.mapTo(self.window, self.window.video.rect().topLeft())
@@ -127,6 +128,7 @@ def test_the_picture_fills_the_window(seeing: Cockpit, teleop: bool) -> None:
         until(cockpit.window.strip.driving.isVisible, "the place of driving")
         let_pass(0.3)
     assert cockpit.share() >= OPEN_SHARE
+    assert cockpit.window.side.width() == PANEL_PX
     cockpit.press(Qt.Key.Key_F9)
     let_pass(0.3)
     assert cockpit.share() >= CLOSED_SHARE
