@@ -35,7 +35,8 @@ _REPORT_EVERY_NS: Final = 50 * MS
 _REST_REPORT_EVERY_NS: Final = 500 * MS
 _LATE_NS: Final = 5 * MS
 _STALE_NS: Final = 40 * MS
-"""An older decision is made again before it is published: the process may have been frozen in between."""
+"""An older decision is made again before it is published, as is one whose command has expired meanwhile: the
+process may have been frozen in between."""
 _PICTURE_NS: Final = 1_200 * MS
 """The gateway's word about the preview is worth nothing afterwards."""
 _FAREWELL_ZEROS: Final = 5
@@ -243,9 +244,10 @@ class Worker:
             self._publish_now(now_ns)
 
     def _publish_now(self, now_ns: int) -> None:
-        if time.monotonic_ns() - now_ns > _STALE_NS:
-            now_ns = time.monotonic_ns()
-            self._state = step(self._state, Tick(), now_ns, self._rules)
+        present_ns, expires_ns = time.monotonic_ns(), self._state.expires_ns
+        if present_ns - now_ns > _STALE_NS or (expires_ns is not None and present_ns >= expires_ns):
+            now_ns = present_ns
+            self._feed(Tick(), now_ns)
         if self._state.output is not None:
             self._base.publish(self._state.output, now_ns)
             self._published_ns = now_ns

@@ -26,9 +26,9 @@ from tests.support.waiting import wait_until
 # Timed: a machine that does other things makes the robot stop without need, which is right and fails a test.
 pytestmark = [pytest.mark.ros, pytest.mark.timed]
 
-VALID_MS = 250
-ON_THE_WAY_MS = 40
-"""From the end of a command's validity to its last motion behind the mux, on a busy machine."""
+AT_THE_BASE_MS = 280
+"""docs/driving.md: nothing is published by a command older than 250 ms, which tests/unit/drive/test_worker.py
+judges to the millisecond. The rest is the last velocity's way through the middleware and the mux."""
 
 
 def oldest_command_ms(robot: Driving, since_ns: int) -> float:
@@ -60,7 +60,7 @@ def test_blackouts_of_300_ms_do_not_move_the_robot_again_by_themselves(robot: Dr
         return oldest_command_ms(robot, since_ns)
 
     for _ in range(5):
-        keeps(VALID_MS + ON_THE_WAY_MS, "age of a command that moves, ms", blackout, per_stalled_s=MS)
+        keeps(AT_THE_BASE_MS, "age of a command that moves, ms", blackout, per_stalled_s=MS)
 
 
 @pytest.mark.parametrize("who", ["gateway", "drive"])
@@ -92,7 +92,7 @@ def test_frozen_and_thawed_again_and_again_nothing_old_moves(robot: Driving, who
         return oldest_command_ms(robot, since_ns)
 
     for _ in range(20):
-        keeps(VALID_MS + ON_THE_WAY_MS, "age of a command that moves, ms", freeze_and_thaw, per_stalled_s=MS)
+        keeps(AT_THE_BASE_MS, "age of a command that moves, ms", freeze_and_thaw, per_stalled_s=MS)
 
 
 def test_another_source_of_higher_priority_stops_us(robot: Driving) -> None:

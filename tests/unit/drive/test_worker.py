@@ -259,6 +259,24 @@ def test_a_decision_that_grew_old_before_it_was_published_is_made_again(world: W
     world.worker.run()
     assert world.moving()
     assert world.moving()[-1] <= 190
+    assert "no valid command" in world.beats()[-1].episode.ended_by, "and its motion has ended then"
+
+
+def test_a_command_that_expires_between_decision_and_publisher_moves_nothing(world: World) -> None:
+    """The graph takes a while to be observed; the decision is of the cycle's beginning."""
+    world.drives()
+    world.end(600)
+    observed = world.observed
+
+    def slow_at_the_end(now_ns: int) -> Surroundings:
+        if START_NS + 430 * MS <= now_ns < START_NS + 450 * MS:
+            world.now_ns += 22 * MS
+        return observed(now_ns)
+
+    setattr(world, "observed", slow_at_the_end)  # noqa: B010
+    world.worker.run()
+    assert 400 <= world.moving()[-1] <= 450
+    assert "no valid command" in world.beats()[-1].episode.ended_by
 
 
 def test_zeros_are_stressed_at_first(world: World) -> None:
