@@ -53,12 +53,14 @@ def followed(last: Episode | None, before: State, after: State, now_ns: int) -> 
         distance_m=last.distance_m + velocity.linear_mps * elapsed_s,
         turned_rad=last.turned_rad + abs(velocity.wz_rad_s) * elapsed_s,
     )
-    return last if driving else last.ended(now_ns, _why(after))
+    return last if driving else last.ended(now_ns, _why(before, after))
 
 
-def _why(after: State) -> str:
+def _why(before: State, after: State) -> str:
     if after.latch:
         return f"stopped by {after.latch.by}" + (f": {after.latch.reason}" if after.latch.reason else "")
+    if before.lease and after.lease and after.lease.session_id != before.lease.session_id:
+        return f"taken over by {after.lease.holder}"
     if after.inhibits:
         return "; ".join(sorted(inhibit.value for inhibit in after.inhibits))
     if not after.enabled:

@@ -43,6 +43,7 @@ def test_distance_and_turn_add_up() -> None:
         ),
         (replace(ARMED, phase=Phase.STOPPING, enabled=False, lease=None), "driving was disabled"),
         (replace(ARMED, phase=Phase.STOPPING, lease=None), "the session ended"),
+        (replace(ARMED, phase=Phase.STOPPING, lease=Lease("s2", "carla")), "taken over by carla"),
     ],
 )
 def test_it_says_why_it_ended(after: State, why: str) -> None:
