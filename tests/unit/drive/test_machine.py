@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from drive.inhibits import Deadlines
 from drive.machine import (
     Enable,
     EndLease,
@@ -23,6 +24,7 @@ from drive.machine import (
     step,
 )
 from drive.phases import TRANSITIONS, Phase, Trigger
+from drive.shaping import Limits
 from drive.values import (
     MS,
     ZERO,
@@ -505,6 +507,26 @@ def test_an_older_tools_command_moves_for_half_a_second() -> None:
     assert robot.after(1).output == ZERO
     robot.command(held=True, valid_until_ns=10**18)
     assert robot.state.phase is Phase.DRIVING
+
+
+@pytest.mark.parametrize(
+    ("mps", "rad_s", "unary_ms"), [(0.05, 0.1, 200), (0.15, 0.4, 500), (0.25, 0.6, 400)], ids=str
+)
+def test_an_older_tools_command_keeps_to_the_caps_and_the_time_of_the_configuration(
+    mps: float, rad_s: float, unary_ms: int
+) -> None:
+    limits = Limits(line_of_sight_mps=mps, line_of_sight_rad_s=rad_s, wheel_mps=0)
+    rules = Rules(limits=limits, deadlines=Deadlines(unary_ns=unary_ms * MS))
+    fastest: dict[str, float] = {}
+    for name, wanted in (("vx_mps", Velocity(vx_mps=0.35)), ("wz_rad_s", Velocity(wz_rad_s=0.8))):
+        robot = Robot(rules, streaming=False)
+        robot.feed(GrantLease(robot.lease))
+        robot.command(held=True, velocity=wanted, valid_until_ns=10**18)
+        for _ in range(unary_ms // 20):
+            robot.after(20)
+            fastest[name] = max(fastest.get(name, 0.0), getattr(robot.state.output, name))
+        assert robot.after(1).output == ZERO
+    assert fastest == pytest.approx({"vx_mps": mps, "wz_rad_s": rad_s})
 
 
 def test_speed_grows_at_the_limit_and_ends_at_once() -> None:
