@@ -33,7 +33,7 @@ REMARKS: Final[Mapping[tuple[str, ...], str]] = {
     ("drive.false_stops_very_lossy",): (
         "a packet that is lost, and whose repetition is lost as well, holds up a lane for longer than the"
         " 250 ms that a command is valid. At 10 % loss that happens on both lanes at once about every minute,"
-        " and the robot stops until the next command."
+        " and the robot stops until a release and a new hold."
     ),
     ("video.cpu", "video.cpu_in_turns"): (
         "what is above the reference is Python once per frame (`preview/pipeline/framing.py`), and the hop"
