@@ -166,3 +166,13 @@ def test_it_is_hardened_and_survives_its_guard(driven: Deployment) -> None:
     with driven.client() as robot:
         wait_until(lambda: teleop_of(robot).stop, "the next start finds a stop", UP_WITHIN_S)
         assert teleop_of(robot).stop.by == "robot-drive"
+
+
+def test_its_limits_are_in_force_and_it_goes_before_no_other_program(deployment: Deployment) -> None:
+    """The other programs yield to the mission (test_hardening.py)."""
+    limits = deployment.inspect("drive")["HostConfig"]
+    assert (limits["Memory"], limits["PidsLimit"]) == (256 << 20, 128)
+    assert limits["NanoCpus"] == min(1.5, os.cpu_count() or 1) * 1e9
+    assert limits["CpuShares"] == 4096
+    worker = wait_until(lambda: processes(deployment).get("worker"), "a worker", UP_WITHIN_S)
+    assert int(Path(f"/proc/{worker}/oom_score_adj").read_text(encoding="ascii")) <= 0
