@@ -4,12 +4,13 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import astuple
 from functools import partial
 from typing import Any, Final
 
 from common.ros_node import message_class, ros_node
 from simrobot.base import TIMEOUT_S, Base, Twist
-from simrobot.mux import Mux, MuxInput
+from simrobot.mux import LOCK_PRIORITY, Mux, MuxInput
 
 INPUTS: Final = {
     MuxInput.NAVIGATION: "/cmd_vel_nav",
@@ -42,9 +43,18 @@ class DriveTrain:
         for source, topic in INPUTS.items():
             mux_node.create_subscription(twist_stamped, topic, partial(self.forward, source), _DEPTH)
         mux_node.create_subscription(boolean, LOCK, self._lock, _DEPTH)
+        # As of twist_mux. The joystick, on no topic, has none.
+        for source, topic in INPUTS.items():
+            self._declare(mux_node, f"topics.{source.name.lower()}", topic, *astuple(source.value))
+        self._declare(mux_node, "locks.stop", LOCK, LOCK_PRIORITY, 0.0)
         base_node.create_subscription(twist_stamped, OUTPUT, self._receive, _DEPTH)
         # As of the mecanum drive controller of ros2_controllers.
         base_node.declare_parameter("reference_timeout", TIMEOUT_S)
+
+    @staticmethod
+    def _declare(node: Any, name: str, topic: str, priority: int, timeout_s: float) -> None:
+        for key, value in (("topic", topic), ("priority", priority), ("timeout", timeout_s)):
+            node.declare_parameter(f"{name}.{key}", value)
 
     def forward(self, source: MuxInput, message: Any) -> None:
         """Takes a message of one source; publishes it if the mux selects it."""
@@ -72,7 +82,7 @@ def drive_train(base: Base) -> Iterator[DriveTrain]:
     from rclpy.executors import SingleThreadedExecutor  # noqa: PLC0415
 
     with (
-        ros_node("twist_mux") as mux_node,
+        ros_node("twist_mux", parameters=True) as mux_node,
         ros_node("mecanum_drive_controller", parameters=True) as base_node,
     ):
         made = DriveTrain(mux_node, base_node, base)

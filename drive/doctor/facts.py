@@ -26,12 +26,30 @@ class TopicFacts:
 
 
 @dataclass(frozen=True, slots=True)
+class Rank:
+    """An input or a lock of the multiplexer, as its parameters have it.
+
+    Attributes:
+        timeout_s: 0 for none.
+    """
+
+    topic: str
+    priority: int
+    timeout_s: float = 0.0
+    lock: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.topic} (priority {self.priority})"
+
+
+@dataclass(frozen=True, slots=True)
 class GraphFacts:
     """What the configured topics look like.
 
     Attributes:
         timeouts: of the base's nodes, in seconds, by "node: parameter"; and as configured.
         foreign_motion: velocities other than zero that reached the base while no driver had the robot.
+        ranks: of the multiplexer's inputs and locks, where it says.
     """
 
     outputs: Sequence[TopicFacts] = ()
@@ -41,6 +59,7 @@ class GraphFacts:
     odometry: TopicFacts | None = None
     timeouts: Mapping[str, float] = field(default_factory=dict)
     foreign_motion: int = 0
+    ranks: Sequence[Rank] = ()
 
 
 @dataclass(frozen=True, slots=True)

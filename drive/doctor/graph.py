@@ -1,25 +1,22 @@
 """Looks at the graph for the doctor."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Final
-
-from rclpy.executors import SingleThreadedExecutor
 
 from common.ros_node import OWN_NODES
 from drive.config import DriveSettings
-from drive.doctor.facts import GraphFacts, TopicFacts
+from drive.doctor.facts import GraphFacts, Rank, TopicFacts
+from drive.doctor.parameters import Parameters, parameters_by
+from drive.doctor.ranking import INPUTS, LOCKS, ranks_in, wanted
 from drive.subscriptions import newest, subscribe, velocity_of
 from drive.values import ZERO
 
 DISCOVERY_S: Final = 3.0
 _LISTEN_S: Final = 1.0
 _POLL_S: Final = 0.02
-_PARAMETER_S: Final = 1.0
 _TIMEOUTS: Final = ("reference_timeout", "cmd_vel_timeout")
 """Of the mecanum and the differential drive controllers of ros2_controllers, in seconds; 0 is none."""
-_DOUBLE: Final = 3
-"""rcl_interfaces/msg/ParameterType.PARAMETER_DOUBLE."""
 
 
 def look(node: Any, settings: DriveSettings) -> GraphFacts:
@@ -39,14 +36,19 @@ def look(node: Any, settings: DriveSettings) -> GraphFacts:
     if listening:
         node.destroy_subscription(listening)  # An executor spins the node below.
     reaching = _topic(node, mux_output.topic, mux_output.type) if mux_output else None
+    outputs = [_topic(node, output.topic, output.type) for output in settings.outputs]
+    with parameters_by(node) as parameters:
+        timeouts = _timeouts(parameters, reaching.subscribers) if reaching else {}
+        ranks = _ranks(parameters, outputs)
     return GraphFacts(
-        outputs=[_topic(node, output.topic, output.type) for output in settings.outputs],
+        outputs=outputs,
         mux_output=reaching,
         lock=_topic(node, settings.lock_topic, "std_msgs/msg/Bool") if settings.lock_topic else None,
         stops=[_topic(node, topic, "std_msgs/msg/Bool") for topic in settings.stop_topics],
         odometry=_topic(node, settings.odometry, "nav_msgs/msg/Odometry") if settings.odometry else None,
-        timeouts=(_timeouts(node, reaching.subscribers) if reaching else {}) | _configured(settings),
+        timeouts=timeouts | _configured(settings),
         foreign_motion=motions,
+        ranks=ranks,
     )
 
 
@@ -81,23 +83,21 @@ def _configured(settings: DriveSettings) -> dict[str, float]:
     return {"configured: base_timeout_ms": timeout_ms / 1000} if timeout_ms is not None else {}
 
 
-def _timeouts(node: Any, names: tuple[str, ...]) -> dict[str, float]:
+def _timeouts(parameters: Parameters, names: tuple[str, ...]) -> dict[str, float]:
     """Asks the base's nodes for the parameters that name a timeout."""
-    from rcl_interfaces.srv import GetParameters  # noqa: PLC0415
+    # One by one: a node that does not know one of several names says nothing at all.
+    found = {
+        f"{name}: {parameter}": parameters.values(name, [parameter]).get(parameter)
+        for name in names
+        for parameter in _TIMEOUTS
+    }
+    return {name: value for name, value in found.items() if isinstance(value, float)}
 
-    found = {}
-    executor = SingleThreadedExecutor(context=node.context)
-    executor.add_node(node)
-    for name in names:
-        client = node.create_client(GetParameters, f"/{name}/get_parameters")
-        # One by one: a name that the node does not know leaves the whole answer empty.
-        for parameter in _TIMEOUTS if client.wait_for_service(timeout_sec=_PARAMETER_S) else ():
-            future = client.call_async(GetParameters.Request(names=[parameter]))
-            executor.spin_until_future_complete(future, timeout_sec=_PARAMETER_S)
-            for value in future.result().values if future.done() else ():
-                if value.type == _DOUBLE:
-                    found[f"{name}: {parameter}"] = value.double_value
-        node.destroy_client(client)
-    executor.remove_node(node)
-    executor.shutdown()
-    return found
+
+def _ranks(parameters: Parameters, inputs: Sequence[TopicFacts]) -> tuple[Rank, ...]:
+    """Asks the nodes that take our velocities how they rank them; the multiplexer is the one that does."""
+    for name in dict.fromkeys(name for each in inputs for name in each.subscribers):
+        names = wanted(parameters.names(name, [INPUTS, LOCKS]))
+        if names and (ranks := ranks_in(parameters.values(name, names))):
+            return ranks
+    return ()

@@ -5,6 +5,7 @@ from typing import Final
 
 from common.findings import Finding, good, note, wrong
 from drive.doctor.facts import GraphFacts, PulseFacts, TopicFacts
+from drive.doctor.ranking import rank_findings
 from omniseer.drive.v1 import drive_pb2 as pb
 
 _OBEYS: Final = 0.5
@@ -45,6 +46,7 @@ def graph_findings(facts: GraphFacts) -> Iterator[Finding]:
         yield from _mux_input(topic)
     if facts.lock:
         yield _lock(facts.lock)
+    yield from rank_findings(facts)
     yield from _base(facts)
     for topic in facts.stops:
         yield _stop_topic(topic)

@@ -44,6 +44,19 @@ def test_the_doctor_finds_mux_base_and_timeout_and_measures_what_a_pulse_does(ro
     assert done.returncode == 0, done.stdout + done.stderr
     found = findings(done)
     assert "twist_mux" in found["mux/cmd_vel_keyboard"]["what"]
+    ranks = {
+        name: (found[name]["verdict"], found[name]["what"]) for name in ("mux.priority", "mux.lock.priority")
+    }
+    assert ranks == {
+        "mux.priority": (
+            "good",
+            "/cmd_vel_keyboard (priority 3) has the highest priority of the multiplexer's inputs",
+        ),
+        "mux.lock.priority": (
+            "good",
+            "the lock on /cmd_vel_emergency_stop (priority 255) ranks above the inputs of others",
+        ),
+    }
     assert "mecanum_drive_controller" in found["base"]["what"]
     assert "stops 1 s after" in found["base.timeout"]["what"]
     assert found["pulse"]["verdict"] == "good"

@@ -5,8 +5,9 @@ from dataclasses import replace
 import pytest
 
 from common.findings import Finding, Verdict
-from drive.doctor.facts import GraphFacts, PulseFacts, TopicFacts
+from drive.doctor.facts import GraphFacts, PulseFacts, Rank, TopicFacts
 from drive.doctor.judgement import graph_findings, program_findings, pulse_findings
+from drive.doctor.ranking import ranks_in, wanted
 from omniseer.drive.v1 import drive_pb2 as pb
 
 STAMPED = "geometry_msgs/msg/TwistStamped"
@@ -14,12 +15,14 @@ INPUT = TopicFacts("/cmd_vel_keyboard", STAMPED, (), ("twist_mux",), frozenset({
 REACHING = TopicFacts("/reference", STAMPED, ("twist_mux",), ("controller",), frozenset({STAMPED}))
 LOCK = TopicFacts("/lock", "std_msgs/msg/Bool", (), ("twist_mux",))
 ODOMETRY = TopicFacts("/odom", "nav_msgs/msg/Odometry", ("ekf",))
+RANKS = (Rank("/nav", 1, 0.5), Rank("/cmd_vel_keyboard", 3, 0.5), Rank("/lock", 255, lock=True))
 GOOD = GraphFacts(
     outputs=[INPUT],
     mux_output=REACHING,
     lock=LOCK,
     odometry=ODOMETRY,
     timeouts={"controller: reference_timeout": 1.0},
+    ranks=RANKS,
 )
 
 
@@ -71,6 +74,20 @@ def test_a_good_robot_has_nothing_to_mend() -> None:
         (replace(GOOD, stops=[TopicFacts("/stop", "x")]), "stop/stop", Verdict.WRONG, "nothing publishes"),
         (replace(GOOD, stops=[TopicFacts("/stop", "x", ("a", "b"))]), "stop/stop", Verdict.WRONG, "a, b all"),
         (replace(GOOD, odometry=replace(ODOMETRY, publishers=())), "odometry", Verdict.NOTE, "/odom"),
+        (replace(GOOD, ranks=(*RANKS, Rank("/joy", 3))), "mux.priority", Verdict.NOTE, "/joy (priority 3)"),
+        (replace(GOOD, ranks=(*RANKS, Rank("/joy", 9))), "mux.priority", Verdict.NOTE, "/joy (priority 9)"),
+        (
+            replace(GOOD, ranks=(*RANKS, Rank("/joy", 255))),
+            "mux.lock.priority",
+            Verdict.WRONG,
+            "/joy (priority 255)",
+        ),
+        (
+            replace(GOOD, ranks=(*RANKS[:2], Rank("/lock", 255, 0.5, lock=True))),
+            "mux.lock.timeout",
+            Verdict.WRONG,
+            "0.5 s",
+        ),
         (replace(GOOD, timeouts={}), "base.timeout", Verdict.NOTE, "no node"),
         (replace(GOOD, timeouts={"a: x": 0.5, "b: y": 0.0}), "base.timeout", Verdict.WRONG, "b: y"),
         (replace(GOOD, timeouts={"a: x": 2.0}), "base.timeout", Verdict.NOTE, "2 s"),
@@ -81,6 +98,37 @@ def test_what_is_wrong_is_said(facts: GraphFacts, check: str, verdict: Verdict, 
     assert finding.verdict is verdict
     assert said in finding.what
     assert finding.why
+
+
+def test_a_multiplexer_that_does_not_say_how_it_ranks_is_not_judged() -> None:
+    for ranks in ((), RANKS[:1]):
+        assert not {"mux.priority", "mux.lock.priority"} & verdicts(replace(GOOD, ranks=ranks)).keys()
+
+
+def test_of_several_inputs_of_our_own_the_highest_counts() -> None:
+    outputs = [INPUT, replace(INPUT, name="/low")]
+    facts = replace(GOOD, outputs=outputs, ranks=(*RANKS, Rank("/low", 0)))
+    assert verdicts(facts)["mux.priority"].verdict is Verdict.GOOD
+
+
+def test_the_ranks_are_read_out_of_the_parameters_of_twist_mux() -> None:
+    values = {
+        "topics.navigation.topic": "cmd_vel_nav",
+        "topics.navigation.priority": 1,
+        "topics.navigation.timeout": 0.5,
+        "topics.navigation.short_desc": "by itself",
+        "locks.stop.topic": "/lock",
+        "locks.stop.priority": 255,
+        "locks.stop.timeout": 0.0,
+        "topics.half.topic": "/half",
+        "topics.wrong.topic": "/wrong",
+        "topics.wrong.priority": "high",
+    }
+    assert "topics.navigation.short_desc" not in wanted(values)
+    assert ranks_in({name: values[name] for name in wanted(values)}) == (
+        Rank("/cmd_vel_nav", 1, 0.5),
+        Rank("/lock", 255, lock=True),
+    )
 
 
 @pytest.mark.parametrize(
