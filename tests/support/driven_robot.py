@@ -40,6 +40,7 @@ REST_S = 0.3
 """Longer than any message takes that is on its way."""
 _HOLD_EVERY_S = 0.02
 _IN_MOTION_WITHIN_S = 45.0
+_READY_WITHIN_S = 20.0
 _ATTEMPT = 100
 """Holds without motion, each 10 ms or more, after which the driver releases and holds anew."""
 BY_EYE = DriveOptions(supervision=Supervision.LINE_OF_SIGHT, input_device="test")
@@ -207,6 +208,15 @@ async def free(robot: DrivenRobot) -> None:
     """Waits until the robot is free, and resets what stops it."""
     async with available(robot):
         pass
+
+
+async def may_be_driven(client: AsyncGatewayClient) -> None:
+    """Waits until a hold would move the robot, for which its drive program has to discover the base.
+
+    A single command is accepted before, and comes to its end without motion.
+    """
+    async with client.drive(BY_EYE) as session:
+        await session.ready(_READY_WITHIN_S)
 
 
 @asynccontextmanager

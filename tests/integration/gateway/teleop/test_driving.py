@@ -47,6 +47,7 @@ from tests.support.driven_robot import (
     held,
     in_motion,
     is_at_rest,
+    may_be_driven,
 )
 from tests.support.driving import Observer
 from tests.support.eventually import eventually
@@ -442,15 +443,6 @@ async def test_disabling_ends_the_session(robot: DrivenRobot, client: AsyncGatew
     assert refused.value.reason == Reason.TELEOP_DISABLED
     assert (await client.send_velocity(SPEED_MPS)).accepted is False
     assert (await client.set_driving_enabled(True)).accepted
-
-
-async def may_be_driven(client: AsyncGatewayClient) -> None:
-    """Waits until a hold would move the robot, for which its drive program has to discover the base.
-
-    A single command is accepted before, and comes to its end without motion.
-    """
-    async with client.drive(BY_EYE) as session:
-        await session.ready(PATIENCE_S)
 
 
 @anew_after_a_loss
