@@ -51,6 +51,11 @@ class Guarded:
     pid: int
     kind: Kind = Kind.TOKEN
 
+    def added(self, person: str, role: Role) -> tuple[Credentials, str]:
+        """Adds a person's login; the credentials, and the number by which they are revoked."""
+        credential, bundle = self.admin.add(CredentialRequest(person, role, self.kind))
+        return parse_login(bundle.text()).credentials, credential.credential_id
+
     def log_in(self, person: str, role: Role) -> dict[str, Any]:
         """Hands a new login over, which the laptop keeps from now on; what `robotctl login --json` said."""
         _, bundle = self.admin.add(CredentialRequest(person, role, self.kind))

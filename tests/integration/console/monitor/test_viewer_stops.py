@@ -10,10 +10,7 @@ import pytest
 from PySide6.QtCore import Qt
 
 from console.client import AsyncGatewayClient, Credentials
-from console.robots.login import parse_login
 from console.window.programs import monitor
-from gateway.access.credential import Kind
-from gateway.access.credential_admin import CredentialRequest
 from gateway.access.role import Role
 from tests.support.driven_robot import BY_EYE, driven_base, held, in_motion
 from tests.support.guarded_program import guarded_program
@@ -56,8 +53,7 @@ def test_a_viewer_stops_a_robot_that_another_person_drives(
         teleop = {"socket": str(drive.socket), "line_of_sight": True}
         with guarded_program(tmp_path, tmp_path, teleop=teleop) as robot:
             anna, vic = (
-                parse_login(robot.admin.add(CredentialRequest(name, role, Kind.TOKEN))[1].text()).credentials
-                for name, role in (("anna", Role.OPERATOR), ("vic", Role.VIEWER))
+                robot.added(name, role)[0] for name, role in (("anna", Role.OPERATOR), ("vic", Role.VIEWER))
             )
             with robot.client() as own:
                 until(lambda: own.status().teleop.enabled, "driving is enabled")

@@ -10,10 +10,7 @@ from typing import Any
 
 import pytest
 
-from console.client import AsyncGatewayClient, Credentials, DriveSession, GatewayError, NotAllowed, Refused
-from console.robots.login import parse_login
-from gateway.access.credential import Kind
-from gateway.access.credential_admin import CredentialRequest
+from console.client import AsyncGatewayClient, DriveSession, GatewayError, NotAllowed, Refused
 from gateway.access.role import Role
 from tests.support.driven_robot import BY_EYE, in_motion
 from tests.support.eventually import eventually
@@ -34,12 +31,6 @@ def guarded(module_ros_domain: int, tmp_path: Path) -> Iterator[tuple[Guarded, B
             yield robot, base
 
 
-def added(robot: Guarded, person: str, role: Role) -> tuple[Credentials, str]:
-    """A person's credentials, and the number by which they are revoked."""
-    credential, bundle = robot.admin.add(CredentialRequest(person, role, Kind.TOKEN))
-    return parse_login(bundle.text()).credentials, credential.credential_id
-
-
 def records(file: Path) -> list[dict[str, Any]]:
     return (
         [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()] if file.exists() else []
@@ -56,7 +47,7 @@ async def test_who_drove_who_stopped_and_who_was_refused(
     guarded: tuple[Guarded, Base], tmp_path: Path
 ) -> None:
     robot, base = guarded
-    (anna, anna_id), (vic, _) = added(robot, "anna", Role.OPERATOR), added(robot, "vic", Role.VIEWER)
+    (anna, anna_id), (vic, _) = robot.added("anna", Role.OPERATOR), robot.added("vic", Role.VIEWER)
     async with (
         AsyncGatewayClient(robot.target, credentials=anna) as driver,
         AsyncGatewayClient(robot.target, credentials=vic) as viewer,
@@ -113,7 +104,7 @@ async def test_a_motion_that_a_killed_gateway_left_is_recorded_by_the_next(
     with listening_base() as base, running_drive(tmp_path) as drive:
         teleop = {"socket": str(drive.socket), "line_of_sight": True}
         with guarded_program(first, first, teleop=teleop) as robot:
-            anna, _ = added(robot, "anna", Role.OPERATOR)
+            anna, _ = robot.added("anna", Role.OPERATOR)
             async with AsyncGatewayClient(robot.target, credentials=anna) as driver:
                 with suppress(GatewayError):
                     async with driver.drive(BY_EYE) as session:

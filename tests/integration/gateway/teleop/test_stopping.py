@@ -12,9 +12,6 @@ from tempfile import TemporaryDirectory
 import pytest
 
 from console.client import AsyncGatewayClient, Credentials, DriveInhibit, NotAllowed
-from console.robots.login import parse_login
-from gateway.access.credential import Kind
-from gateway.access.credential_admin import CredentialRequest
 from gateway.access.role import Role
 from tests.support.bad_links import Relay
 from tests.support.driven_robot import (
@@ -173,9 +170,7 @@ async def test_a_revoked_driver_stops_within_1_1_s(ros_domain: int, tmp_path: Pa
                     directory, directory, teleop={"socket": str(drive.socket), "line_of_sight": True}
                 ) as robot,
             ):
-                credential, bundle = robot.admin.add(CredentialRequest("anna", Role.OPERATOR, Kind.TOKEN))
-                anna = parse_login(bundle.text()).credentials
-                return await revoked_s(robot, base, drive, anna, credential.credential_id)
+                return await revoked_s(robot, base, drive, *robot.added("anna", Role.OPERATOR))
 
     await keeps_async(1.1, "s of motion after the driver's credential was revoked", measure)
 
