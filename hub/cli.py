@@ -11,6 +11,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from common.addresses import is_loopback
 from common.errors import ExitCode, UserError
 from fleet.connection import FleetAddress
 from fleet.errors import HubError, HubReason
@@ -239,8 +240,13 @@ def exporter(
         Path | None, typer.Option(envvar="ROBOT_HUB_CREDENTIALS", help="An operator's NATS credentials.")
     ] = None,
     ca: Annotated[Path | None, typer.Option(envvar="ROBOT_HUB_CA", help="ca.pem of the hub.")] = None,
+    *,
     host: Annotated[str, typer.Option(help="Address to serve the metrics on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Its port.")] = 9109,
+    insecure: Annotated[
+        bool,
+        typer.Option("--insecure", help="Accept that others on the network can read them."),
+    ] = False,
 ) -> None:
     """Serve the fleet's metrics for Prometheus, until Ctrl-C."""
     from hub.exporter.app import export_until_stopped  # noqa: PLC0415 - prometheus_client
@@ -250,6 +256,12 @@ def exporter(
         raise UserError(
             f"--ca is missing: without it {server} can't be used, only nats:// to this machine",
             "Add --ca FILE, with the ca.pem of the hub",
+            exit_code=ExitCode.USAGE,
+        )
+    if not (insecure or is_loopback(host)):
+        raise UserError(
+            f"--host is {host}: anyone on that network could read the metrics",
+            "Use 127.0.0.1, or accept it with --insecure",
             exit_code=ExitCode.USAGE,
         )
     address = FleetAddress(names, credentials, ca, name="robot-bridge hub exporter")
