@@ -240,6 +240,38 @@ def test_a_wal_that_was_cut_is_no_loss(tmp_path: Path) -> None:
         shutil.rmtree(cut)
 
 
+def pragmas(database: Database) -> dict[str, object]:
+    """How SQLite itself says that it treats the disk."""
+    database.open()
+    assert database._connection
+    names = ("journal_mode", "synchronous", "locking_mode", "wal_autocheckpoint", "page_size")
+    return {name: database._connection.execute(f"PRAGMA {name}").fetchone()[0] for name in names}
+
+
+@pytest.mark.parametrize("before", ["nothing", "its own", "a damaged one", "one with another journal"])
+def test_what_was_taken_is_on_the_disk_however_it_was_opened(tmp_path: Path, before: str) -> None:
+    """WAL alone is synced at checkpoints: only with synchronous = FULL a commit survives a power cut."""
+    path = tmp_path / NAME
+    if before == "a damaged one":
+        path.write_bytes(b"something else" * 1000)
+    elif before != "nothing":
+        first = opened(tmp_path)
+        add(first, event(1))
+        first.close()
+    if before == "one with another journal":
+        with closing(sqlite3.connect(path)) as db:
+            assert db.execute("PRAGMA journal_mode = DELETE").fetchone() == ("delete",)
+    full = 2  # sqlite.org/pragma.html#pragma_synchronous
+    with closing(opened(tmp_path)) as database:
+        assert pragmas(database) == {
+            "journal_mode": "wal",
+            "synchronous": full,
+            "locking_mode": "exclusive",
+            "wal_autocheckpoint": 256,
+            "page_size": 4096,
+        }
+
+
 def test_bytes_of_others_are_moved_aside(tmp_path: Path) -> None:
     (tmp_path / NAME).write_bytes(b"something else" * 1000)
     database = opened(tmp_path)
