@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from recorder.store import run_bundles
+from recorder.store.manifest import RecordingState
 from recorder.store.run_bundles import RunBundles
 
 
@@ -39,3 +40,47 @@ def test_files_whose_names_can_t_be_requested_are_counted(tmp_path: Path) -> Non
     (found,) = RunBundles((tmp_path,)).all()
     assert [file.name for file in found.files] == ["manifest.yaml"]
     assert found.unlisted == 2
+
+
+@pytest.mark.parametrize(
+    ("manifest", "state"),
+    [
+        ("state: complete\n", RecordingState.COMPLETE),
+        ("run_id: 7\nstatus: 'complete'  # by the runner\n", RecordingState.COMPLETE),
+        ("state: in_progress\n", RecordingState.RECORDING),
+        ('run_id: 7\nstatus : "in_progress"\n', RecordingState.RECORDING),
+        ("state: incomplete\n", RecordingState.RECOVERED),
+        ("", RecordingState.RECOVERED),
+        ("state: paused\n", RecordingState.RECOVERED),
+        ("state: complete_but_for_the_video\n", RecordingState.RECOVERED),
+        ("video:\n  state: complete\n", RecordingState.RECOVERED),
+    ],
+)
+def test_a_bundle_is_complete_or_in_progress_only_if_its_manifest_says_so(
+    tmp_path: Path, manifest: str, state: RecordingState
+) -> None:
+    folder = tmp_path / "first"
+    folder.mkdir()
+    (folder / "manifest.yaml").write_text(manifest, encoding="utf-8")
+    bundles = RunBundles((tmp_path,))
+    (listed,) = bundles.all()
+    assert listed.state is state
+    assert listed.final == (state is not RecordingState.RECORDING)
+    assert bundles.get("run-first") == listed
+
+
+def test_a_bundle_in_progress_is_final_once_its_manifest_says_so(tmp_path: Path) -> None:
+    folder = tmp_path / "first"
+    folder.mkdir()
+    manifest = folder / "manifest.yaml"
+    bundles = RunBundles((tmp_path,))
+    found = []
+    for state in ("in_progress", "incomplete", "complete"):
+        manifest.write_text(f"state: {state}\n", encoding="utf-8")
+        (bundle,) = bundles.all()
+        found.append((bundle.state, bundle.final))
+    assert found == [
+        (RecordingState.RECORDING, False),
+        (RecordingState.RECOVERED, True),
+        (RecordingState.COMPLETE, True),
+    ]
