@@ -18,7 +18,8 @@ _BEST_EFFORT_LOWEST: Final = 2 << 13 | 7
 def step_back() -> None:
     """Lowers the priority of this thread, and of those that it starts, for the CPU and for the disk."""
     try:
-        os.setpriority(os.PRIO_PROCESS, 0, _NICE)
+        # Root could also raise it: a supervisor may have started this program with a lower one.
+        os.setpriority(os.PRIO_PROCESS, 0, max(_NICE, os.getpriority(os.PRIO_PROCESS, 0)))
     except OSError as error:
         _log.info("without a lower priority for the CPU: %s", error.strerror)
     number = _SYS_IOPRIO_SET.get(os.uname().machine)
