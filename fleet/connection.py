@@ -177,15 +177,22 @@ class Hub:
         headers = {OPERATION: "DEL"}
         acknowledged(await self._open().request(f"$KV.{bucket}.{key}", b"", timeout_s, headers))
 
-    async def entries(self, bucket: str, timeout_s: float = REQUEST_TIMEOUT_S) -> dict[str, Entry]:
+    async def entries(
+        self, bucket: str, keys: str = ">", timeout_s: float = REQUEST_TIMEOUT_S
+    ) -> dict[str, Entry]:
         """Returns the present entries of a bucket, by key.
 
+        Args:
+            bucket: its name.
+            keys: which of it, as "r1.>".
+            timeout_s: for each answer of the hub.
+
         Raises:
-            HubError: it can't be read.
+            HubError: it can't be read; TOO_MANY: it has more than is read at once (`consuming.present`).
         """
         found: dict[str, Entry] = {}
         start = Start.last_per_subject()
-        present = consuming.present(self._open(), f"KV_{bucket}", f"$KV.{bucket}.>", start, timeout_s)
+        present = consuming.present(self._open(), f"KV_{bucket}", f"$KV.{bucket}.{keys}", start, timeout_s)
         async with aclosing(present) as deliveries:
             async for delivery in deliveries:
                 entry = _entry(bucket, delivery)

@@ -25,6 +25,10 @@ _BATCH: Final = 256
 """Messages requested at once."""
 _MAX_BYTES: Final = 4 * 1024 * 1024
 """Bytes requested at once; more than any single message may have."""
+MOST_PRESENT: Final = 100_000
+"""Messages that are read at once (`present`): ten times the robots that a console shows."""
+MOST_PRESENT_BYTES: Final = 256 * 1024 * 1024
+"""Bytes of their contents: they are all in memory, and a hub could send without end."""
 _TIMEOUT_S: Final = 5.0
 _FIRST_PAUSE_S: Final = 0.05
 _LONGEST_PAUSE_S: Final = 0.5
@@ -157,21 +161,33 @@ async def present(
     """Yields the messages that are in a stream now, and ends.
 
     Raises:
-        HubError: it can't be read.
+        HubError: it can't be read; TOO_MANY: there are more than MOST_PRESENT, or MOST_PRESENT_BYTES.
     """
     consumer, pending = await _new_consumer(session, stream, subjects, start, timeout_s)
+    count = size = 0
     try:
+        if pending > MOST_PRESENT:
+            raise _too_many(f"{stream} has {pending} messages, more than the {MOST_PRESENT} that")
         async with _Puller.open(session, stream, consumer) as puller:
             while pending > 0:
                 before = pending
                 async with aclosing(puller.request(min(pending, _BATCH), timeout_s)) as deliveries:
                     async for delivery in deliveries:
                         pending = delivery.pending
+                        count, size = count + 1, size + len(delivery.payload)
+                        if count > MOST_PRESENT:
+                            raise _too_many(f"{stream} has more than the {MOST_PRESENT} messages that")
+                        if size > MOST_PRESENT_BYTES:
+                            raise _too_many(f"{stream} has more than the {MOST_PRESENT_BYTES} bytes that")
                         yield delivery
                 if pending == before:
                     raise HubError(HubReason.TIMEOUT, f"the hub sends nothing of {stream} in {timeout_s:g} s")
     finally:
         await _forget(session, stream, consumer)
+
+
+def _too_many(text: str) -> HubError:
+    return HubError(HubReason.TOO_MANY, f"{text} are read at once")
 
 
 async def count(session: Session, stream: str, subjects: str, timeout_s: float) -> int:

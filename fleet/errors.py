@@ -21,6 +21,8 @@ class HubReason(Enum):
     """A stream or the account has reached its limit of bytes or messages."""
     TOO_LARGE = "too large"
     """The message exceeds the limit for one message. It will not become possible by itself."""
+    TOO_MANY = "too many"
+    """There is more than is read at once. A part of it may be read."""
     MISSING = "missing"
     """The hub has no such stream, consumer, key or message."""
     INVALID = "invalid"

@@ -78,7 +78,7 @@ def recordings(
     ] = "",
 ) -> None:
     """List the recordings in the hub's store, the newest first, with their receipts checked."""
-    found = [item for item in asyncio.run(_recordings(session)) if robot in ("", item.robot)]
+    found = [item for item in asyncio.run(_recordings(session, robot)) if robot in ("", item.robot)]
     session.show(
         recordings_json(found), recordings_table(found) if found else "No recording was uploaded yet."
     )
@@ -234,12 +234,12 @@ async def _rows(session: FleetSession) -> tuple[FleetRow, ...]:
         return board.rows(clock.unix_ms())
 
 
-async def _recordings(session: FleetSession) -> list[StoredRecording | Unreadable]:
+async def _recordings(session: FleetSession, robot: str) -> list[StoredRecording | Unreadable]:
     from console.fleet.hub import read_recordings  # noqa: PLC0415
 
     login = session.login
     async with session.connect() as hub:
-        return await read_recordings(hub, login.fleet, login.receivers)
+        return await read_recordings(hub, login.fleet, login.receivers, robot)
 
 
 async def _get(

@@ -11,6 +11,7 @@ from console.client import results
 from console.client.errors import GatewayFailed, Refused, Unreachable
 from console.client.mapping.reader import read
 from console.client.results import RecordingFile
+from console.fleet.hub import recording_entries
 from console.fleet.receipts import check_receipt
 from console.fleet.store import read_whole, usable
 from console.fleet.values import ReceiptCheck, Unreadable
@@ -96,7 +97,7 @@ async def read_verified(
         HubError: The hub does not answer.
     """
     key = f"{robot}.{recording_id}"
-    entry = (await hub.entries(names.RECORDINGS)).get(key)
+    entry = (await recording_entries(hub, robot)).get(key)
     if entry is None:
         raise UserError(
             f"the store has no recording {printable(recording_id)} of {printable(robot)}",

@@ -12,7 +12,7 @@ from console.fleet.values import CommandAnswer, FleetItem, StoredRecording, Unre
 from console.fleet.wire import answer_of, command_bytes, items_of, recording_of
 from fleet import names
 from fleet.clock import HubClock
-from fleet.connection import Delivery, Hub, Start
+from fleet.connection import Delivery, Entry, Hub, Start
 from omniseer.fleet.v1.command_pb2 import Command
 
 _MS_PER_S: Final = 1000
@@ -34,7 +34,7 @@ async def read_board(hub: Hub) -> FleetBoard:
 
 
 async def read_recordings(
-    hub: Hub, fleet: str, receivers: tuple[bytes, ...]
+    hub: Hub, fleet: str, receivers: tuple[bytes, ...], robot: str = ""
 ) -> list[StoredRecording | Unreadable]:
     """Returns the recordings in the hub's store, the newest first, with their receipts checked.
 
@@ -42,12 +42,13 @@ async def read_recordings(
         hub: The hub.
         fleet: Name of the fleet, which a receipt has to have.
         receivers: Ed25519 public keys of the fleet's receivers, 32 bytes each.
+        robot: One robot's; empty for all.
 
     Raises:
-        HubError: The hub does not answer.
+        HubError: The hub does not answer, or has more than is read at once.
     """
     found: list[StoredRecording | Unreadable] = []
-    for key, entry in sorted((await hub.entries(names.RECORDINGS)).items()):
+    for key, entry in sorted((await recording_entries(hub, robot)).items()):
         read = recording_of(key, entry.value)
         if isinstance(read, Unreadable):
             found.append(read)
@@ -66,6 +67,17 @@ async def read_recordings(
             )
         )
     return sorted(found, key=_newest_first)
+
+
+async def recording_entries(hub: Hub, robot: str) -> dict[str, Entry]:
+    """Returns the hub's entries of recordings, by key: one robot's, or all.
+
+    Raises:
+        HubError: The hub does not answer, or has more than is read at once.
+    """
+    if robot and not names.ROBOT_NAME.fullmatch(robot):
+        return {}  # What is no name would be a subject of anything.
+    return await hub.entries(names.RECORDINGS, f"{robot}.>" if robot else ">")
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ import pytest
 from common.errors import UserError
 from console.client.errors import GatewayFailed, Refused, Unreachable
 from console.fleet.fetching import ReceiverUrls, read_verified, tls_context
+from console.fleet.hub import recording_entries
 from fleet.errors import HubError, HubReason
 from fleet.receipt_keys import ReceiptSigner, digest_of, new_seed
 from omniseer.fleet.v1 import upload_pb2 as pb
@@ -24,6 +25,9 @@ class HubInMemory:
     Args:
         answer: To a request: a message, bytes, or an error.
         entries: Of the bucket of recordings.
+
+    Attributes:
+        subjects: Of requests, and which keys of the bucket were read.
     """
 
     def __init__(self, answer: Any = None, **entries: bytes) -> None:
@@ -36,7 +40,8 @@ class HubInMemory:
             raise self._answer
         return self._answer if isinstance(self._answer, bytes) else bytes(self._answer.SerializeToString())
 
-    async def entries(self, _bucket: str) -> dict[str, Any]:
+    async def entries(self, _bucket: str, keys: str) -> dict[str, Any]:
+        self.subjects.append(keys)
         return {key.replace("_", "."): SimpleNamespace(value=value) for key, value in self._entries.items()}
 
 
@@ -91,6 +96,20 @@ async def read(entry: pb.StoredRecording | bytes, recording_id: str = "one") -> 
     hub: Any = HubInMemory(r1_one=entry if isinstance(entry, bytes) else entry.SerializeToString())
     keys = (SIGNER.public_key,)
     return await read_verified(hub, "lab", keys, robot="r1", recording_id=recording_id, tls=tls_context(None))
+
+
+@pytest.mark.parametrize(("robot", "keys"), [("", ">"), ("r1", "r1.>")])
+async def test_one_robots_recordings_alone_are_read(robot: str, keys: str) -> None:
+    hub: Any = HubInMemory()
+    await recording_entries(hub, robot)
+    assert hub.subjects == [keys]
+
+
+@pytest.mark.parametrize("robot", ["*", ">", "r1.*", "r1 x", "r1\r\nPUB x 1\r\nx", "R1", "x" * 64])
+async def test_what_is_no_robots_name_never_becomes_a_subject(robot: str) -> None:
+    hub: Any = HubInMemory()
+    assert await recording_entries(hub, robot) == {}
+    assert hub.subjects == []
 
 
 async def test_a_verified_recording_has_its_files_and_they_are_final() -> None:
