@@ -51,6 +51,18 @@ def test_the_contributors_guide_names_files_that_exist() -> None:
     assert [path for path in sorted(named) if not (ROOT / path).exists()] == []
 
 
+def test_the_contributors_guide_has_what_the_environment_decides_of_a_test() -> None:
+    guide = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    sources = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("*.py"))
+    read = set(re.findall(r"os\.environ\.get\(\"([A-Z_]+)\"", sources)) - {
+        "PYTHONPATH",
+        "XDG_CACHE_HOME",
+        "DEBIAN_NATS_SERVER",
+    }
+    assert "RECORDER_KILLS" in read
+    assert [name for name in sorted(read) if f"{name}=" not in guide] == []
+
+
 def drawn() -> list[tuple[str, str]]:
     """The way of a call in docs/architecture.md: the file of each line, and what follows its name."""
     page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
