@@ -13,7 +13,6 @@ from common.health import Health
 from recorder.assembly import build
 from recorder.config import RecorderSettings
 from recorder.operations import Operations
-from recorder.priority import step_back
 from recorder.recorder import Recorder
 from recorder.rpc.export_connections import ExportConnections
 from recorder.rpc.servicer import SERVICE, RecorderServicer
@@ -34,8 +33,6 @@ async def serve(settings: RecorderSettings, stop: asyncio.Event) -> None:
     Raises:
         UserError: the folder, the socket or ROS 2 can't be used.
     """
-    # Before there are other threads: each begins with the priority of the one that starts it.
-    step_back()
     queue = SampleQueue(settings.queue_bytes)
     with ExitStack() as locks:
         for folder in _own_folders(settings):

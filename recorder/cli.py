@@ -12,6 +12,7 @@ from common.errors import ExitCode
 from common.findings import end_with_findings
 from common.program_options import JsonOption, PrintOption, SchemaOption, check_settings, config_option
 from recorder.config import RecorderSettings
+from recorder.priority import step_back
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, help="Records the robot's topics and video.")
 
@@ -24,6 +25,9 @@ _Config = Annotated[Path | None, config_option("recorder")]
 def serve(config_file: _Config = None) -> None:
     """Records until Ctrl-C."""
     settings = _load(config_file)
+    # Before there are other threads, which the import of rclpy starts as well: each begins with the priority
+    # of the one that starts it.
+    step_back()
     from recorder.app import serve as serve_app  # noqa: PLC0415
 
     program.bound_arenas()

@@ -1,8 +1,10 @@
 """The real program between real publishers and a real disk; other programs judge what it leaves."""
 
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
+import psutil
 import pytest
 from rosbags.rosbag2 import Reader
 
@@ -87,3 +89,25 @@ def test_a_second_recorder_on_the_folder_ends_with_one_sentence(tmp_path: Path) 
         assert other.process
         assert other.process.wait(5) == 1
         assert other.log.read_text(encoding="utf-8").count("\n") == 1
+
+
+def priorities(pid: int) -> list[tuple[bool, int, int]]:
+    """Of each thread: whether its nice value is lowered, and its I/O class and level."""
+    found = []
+    for thread in psutil.Process(pid).threads():
+        with suppress(psutil.NoSuchProcess):  # One of a pool may end meanwhile.
+            of_thread = psutil.Process(thread.id)
+            ionice = of_thread.ionice()
+            found.append((of_thread.nice() >= 10, int(ionice.ioclass), int(ionice.value)))
+    return found
+
+
+@pytest.mark.usefixtures("ros_domain")
+def test_all_its_threads_are_behind_everything_else_on_the_robot(tmp_path: Path) -> None:
+    """Those of gRPC, rclpy and the writer, too: each has the priority of the thread that started it."""
+    with recorder_program(tmp_path, ring={"preset": "all"}) as program:
+        assert program.process
+        found = priorities(program.process.pid)
+        assert program.stop() == 0
+    assert len(found) > 3
+    assert set(found) == {(True, int(psutil.IOPRIO_CLASS_BE), 7)}
