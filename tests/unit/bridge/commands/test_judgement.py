@@ -1,6 +1,6 @@
 """What becomes of a message of the stream of commands, whatever it is."""
 
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 from hypothesis import given
@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from bridge.commands.hub_time import HubTime, age_s, hub_time
 from bridge.commands.judgement import Denial, Request, Snapshot, Stray, Upload, judge
+from bridge.config import CommandSettings
 from omniseer.fleet.v1 import command_pb2 as pb
 
 BOTH = ("upload", "snapshot")
@@ -65,6 +66,23 @@ def test_what_is_not_is_refused(message: pb.Command | bytes, options: dict[str, 
     assert isinstance(denial, Denial)
     assert denial.outcome == REFUSED
     assert denial.message
+
+
+@pytest.mark.parametrize("field", range(8, 16))
+def test_an_action_of_another_schema_is_refused_with_a_sentence_of_ours(field: int) -> None:
+    """Of reading the configuration, for example: what the hub wrote is not part of the answer."""
+    wanted = b"bridge.yaml"
+    payload = command(upload=None).SerializeToString() + bytes([field << 3 | 2, len(wanted)]) + wanted
+    assert judged(payload) == Denial("c1", REFUSED, "there is no such command for robots")
+
+
+def test_two_actions_are_all_that_there_are_and_results_have_no_room_for_more() -> None:
+    """docs/fleet.md says what never crosses the wire: a further action or field is a decision."""
+    (action,) = pb.Command.DESCRIPTOR.oneofs
+    assert {field.name for field in action.fields} == set(BOTH)
+    assert set(get_args(get_args(CommandSettings.model_fields["allowed"].annotation)[0])) == set(BOTH)
+    result = pb.CommandResult.DESCRIPTOR.fields_by_name
+    assert set(result) == {"command_id", "robot", "outcome", "message", "recording_id"}
 
 
 @pytest.mark.parametrize("age", [None, 60.0, 1e9])
