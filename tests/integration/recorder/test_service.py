@@ -241,6 +241,33 @@ async def test_run_bundles_are_listed_and_exported_and_never_changed(tmp_path: P
     assert (bundle / "video" / "source.ts").exists()
 
 
+async def test_a_run_bundle_in_progress_is_shown_and_exported_once_it_has_ended(tmp_path: Path) -> None:
+    bundle = tmp_path / "runs" / "first"
+    bundle.mkdir(parents=True)
+    manifest = bundle / "manifest.yaml"
+    manifest.write_text("state: in_progress\n", encoding="utf-8")
+    (bundle / "odometry.jsonl").write_bytes(b"{}\n")
+    asked = pb.GetRecordingRequest(recording_id="run-first")
+    async with served(tmp_path, run_bundles=[str(tmp_path / "runs")]) as robot:
+        (listed,) = (await robot.stub.ListRecordings(pb.ListRecordingsRequest())).recordings
+        assert listed.state == pb.RECORDING_STATE_RECORDING
+        runs = (await robot.stub.GetRecording(asked)).recording
+        assert {file.name: (file.final, file.sha256) for file in runs.files} == {
+            "manifest.yaml": (False, b""),
+            "odometry.jsonl": (False, b""),
+        }
+        call = exported(robot.stub, recording_id="run-first", file="odometry.jsonl")
+        assert await refused(call) == (grpc.StatusCode.FAILED_PRECONDITION, "FILE_NOT_FINAL")
+        manifest.write_text("state: incomplete\n", encoding="utf-8")
+        ended = (await robot.stub.GetRecording(asked)).recording
+        assert (ended.state, ended.stop_reason) == (
+            pb.RECORDING_STATE_RECOVERED,
+            pb.RECORDING_STOP_REASON_INTERRUPTED,
+        )
+        _, content = await exported(robot.stub, recording_id="run-first", file="odometry.jsonl")
+        assert content == b"{}\n"
+
+
 async def test_snapshots_and_incidents(tmp_path: Path) -> None:
     async with served(tmp_path) as robot:
         call = robot.stub.TriggerSnapshot(pb.TriggerSnapshotRequest(request_id="1"))
