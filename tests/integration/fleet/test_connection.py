@@ -158,6 +158,7 @@ async def test_a_bucket_is_read_and_watched(servers: NatsServers) -> None:
         entries = await hub.entries(names.STATES)
         assert len(entries) == 299
         assert entries["r7"].value == b"new"
+        assert set(await hub.entries(names.STATES, "r7")) == {"r7"}
         async with aclosing(hub.watch_bucket(names.STATES)) as watched:
             first = [await anext(watched) for _ in range(300)]
             assert {each.key for each in first if not each.deleted} == entries.keys()
