@@ -1,6 +1,7 @@
 """What the tables of docs/benchmarks.md can't show: how they come about, and why a row misses its bar."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Final
 
 REMARKS: Final[Mapping[tuple[str, ...], str]] = {
@@ -76,3 +77,30 @@ REMARKS: Final[Mapping[tuple[str, ...], str]] = {
     ),
 }
 """Text by the rows that it is about. A published row that misses its bar has one, with the reason."""
+
+
+@dataclass(frozen=True, slots=True)
+class Older:
+    """Published figures that were measured in another way than these rows are now.
+
+    Attributes:
+        rows: patterns of their names, fnmatch(3).
+        commits: that were measured so; a row of another commit is not meant.
+        text: how they were measured.
+    """
+
+    rows: tuple[str, ...]
+    commits: frozenset[str]
+    text: str
+
+
+OLDER: Final = (
+    Older(
+        ("ros.*", "idle.*", "drive.*", "video.ros_camera_cpu"),
+        frozenset({"8f53ae69", "86c63e59", "648d6af8", "b15aab27"}),
+        "measured over the shared memory of Fast DDS. Containers and systemd units have"
+        " `ROBOT_ROS_TRANSPORT=udp`, and since commit 333854a8 these rows have it, too: figures measured"
+        " since then are not comparable with these.",
+    ),
+)
+"""Such a remark is no reason why a row misses its bar. It is on the page until the rows are measured anew."""

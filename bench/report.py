@@ -1,13 +1,14 @@
 """The rows as a table on the terminal, and as docs/benchmarks.md."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Final
 
 from rich.table import Table
 
 from bench.catalogue import NAMES
-from bench.remarks import REMARKS
+from bench.remarks import OLDER, REMARKS
 from bench.results import ROOT, Conditions, Run
 from bench.rows import Row
 
@@ -60,11 +61,8 @@ def page(runs: Sequence[Run]) -> str:
         lines.append(_NOTHING)
     for run in runs:
         lines += _section(run)
-    remarks = [
-        f"- {', '.join(f'`{name}`' for name in about)}: {text}"
-        for about, text in REMARKS.items()
-        if set(about) & set(names)
-    ]
+    remarks = [*_of_older_figures(runs)]
+    remarks += [_remark(about, text) for about, text in REMARKS.items() if set(about) & set(names)]
     if remarks:
         lines += ["", "## Remarks", "", *remarks]
     lacking = [f"`{name}`" for name in NAMES if name not in names]
@@ -76,6 +74,21 @@ def page(runs: Sequence[Run]) -> str:
 def write_page(runs: Sequence[Run], file: Path = PAGE) -> None:
     """Replaces docs/benchmarks.md."""
     file.write_text(page(runs), encoding="utf-8")
+
+
+def _remark(about: Sequence[str], text: str) -> str:
+    return f"- {', '.join(f'`{name}`' for name in about)}: {text}"
+
+
+def _of_older_figures(runs: Sequence[Run]) -> Iterator[str]:
+    for older in OLDER:
+        figures = [
+            (row.name, run.on.commit) for run in runs if run.on.commit in older.commits for row in run.rows
+        ]
+        rows = [pattern for pattern in older.rows if any(fnmatchcase(name, pattern) for name, _ in figures)]
+        commits = [commit for name, commit in figures if any(fnmatchcase(name, row) for row in rows)]
+        if rows:
+            yield _remark(rows, f"at commit {', '.join(dict.fromkeys(commits))} {older.text}")
 
 
 def _section(run: Run) -> list[str]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bench.catalogue import GROUPS, NAMES
-from bench.remarks import REMARKS
+from bench.remarks import OLDER, REMARKS
 from bench.report import PAGE, page
 from bench.results import CHANGED, RESULTS, published
 
@@ -38,6 +38,11 @@ def test_every_promise_that_is_not_kept_has_its_reason() -> None:
 
 def test_remarks_are_about_rows_that_exist() -> None:
     assert [name for about in REMARKS for name in about if name not in NAMES] == []
+
+
+def test_what_is_said_of_older_figures_is_of_rows_that_exist() -> None:
+    patterns = [pattern for one in OLDER for pattern in one.rows]
+    assert [each for each in patterns if not any(fnmatchcase(name, each) for name in NAMES)] == []
 
 
 def named(document: Path) -> set[str]:

@@ -1,10 +1,12 @@
 """The page of the published rows: what its columns say, and which rows it lacks."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from bench.catalogue import NAMES
+from bench.remarks import OLDER
 from bench.report import page, summary
 from bench.results import Conditions, Run
 from bench.rows import Row
@@ -60,3 +62,11 @@ def test_rows_without_a_figure_are_named() -> None:
     assert all(f"`{name}`" in lacking for name in NAMES[1:])
     assert "No figure is published yet" not in shown
     assert "No figure is published yet" in page([])
+
+
+def test_figures_that_were_measured_in_another_way_are_remarked_until_they_are_measured_anew() -> None:
+    older = OLDER[0]
+    before = replace(ON, commit=min(older.commits))
+    both = [Run(before, (row(name="ros.flat"), row(name="status.tls"))), Run(ON, (row(name="idle.cpu"),))]
+    assert f"- `ros.*`: at commit {before.commit} {older.text}" in page(both).splitlines()
+    assert older.text not in page([Run(ON, (row(name="ros.flat"),)), Run(before, (row(name="status.tls"),))])
