@@ -12,13 +12,24 @@ from pathlib import Path
 from urllib.request import urlopen
 
 import pytest
+from rclpy.duration import Duration
+from sensor_msgs.msg import Image
 
-from common.camera_tap import READY, STATUS_REQUEST, encode_watch
+from common.camera_tap import (
+    MAX_PACKET_BYTES,
+    READY,
+    STATUS_REQUEST,
+    Header,
+    Kind,
+    decode,
+    encode_watch,
+)
 from preview.pipeline.tap_client import TapClient, TapError
 from tap.app import MAX_CONNECTIONS
 from tests.support.free import free_tcp_port
 from tests.support.ros_camera import compressed, picture, ros_camera
 from tests.support.running_tap import RunningTap
+from tests.support.talker import talking
 from tests.support.waiting import wait_until
 
 pytestmark = pytest.mark.ros
@@ -55,6 +66,18 @@ def ends(client: socket.socket) -> bool:
         return client.recv(10_000) == b""
     except ConnectionError:
         return True
+
+
+def received(client: socket.socket) -> Header:
+    """What the next frame is; its memory is given back."""
+    for _ in range(10):  # A problem, and its end, may come first.
+        packet, memory, _, _ = socket.recv_fds(client, MAX_PACKET_BYTES, 1)
+        header, _ = decode(packet)
+        for each in memory:
+            os.close(each)
+        if header.kind is Kind.FRAME:
+            return header
+    pytest.fail("no frame has come")
 
 
 def has_room(tap: RunningTap) -> bool:
@@ -169,6 +192,21 @@ def test_a_client_that_permits_nothing_gets_nothing_and_costs_nothing(tap: Runni
             client.send(READY)
         tap.wait_for(lambda state: state["topics"][TOPIC]["frames"] >= 1, "a frame")
         assert tap.state()["topics"][TOPIC]["frames"] <= 2, "permits do not add up"
+
+
+def test_a_reader_that_was_slow_gets_the_newest_picture(tap: RunningTap) -> None:
+    """Those that it missed are gone: a picture's width is its number, times ten."""
+    with talking() as talker, connected(tap) as client:
+        publisher = talker.publisher(TOPIC, Image)
+        client.send(encode_watch(TOPIC))
+        wait_until(lambda: publisher.get_subscription_count() == 1, "subscribed")
+        for newest in (5, 10):
+            for number in range(newest - 4, newest + 1):
+                publisher.publish(picture(width=10 * number, height=8))
+            assert publisher.wait_for_all_acked(Duration(seconds=10)), "all have reached the tap"
+            client.send(READY)
+            assert received(client).width == 10 * newest
+        assert tap.state()["topics"][TOPIC]["frames"] == 2
 
 
 def test_there_is_room_for_so_many_connections(tap: RunningTap) -> None:
