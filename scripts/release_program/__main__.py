@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import UserError
-from release_program import git, image_sbom, images, sbom
+from release_program import git, image_sbom, images, programs, sbom
 from release_program.changelog import section
 from release_program.distributions import DISTRIBUTIONS
 from release_program.environments import install
 from release_program.packages import build, stage
 from release_program.preconditions import Facts, refusals
 from release_program.sums import write_sums
-from release_program.wheelhouse import download
+from release_program.wheelhouse import build_sources, download
 
 _ROOT: Final = Path(__file__).parents[2]
 _PYTHONS: Final = ("3.11", "3.12", "3.13")
@@ -36,7 +36,7 @@ def main() -> int:
     parser.add_argument(
         "--without-images",
         action="store_true",
-        help="only what operators install; a robot can't be upgraded to it",
+        help="a robot that runs by compose.yaml can't be upgraded to it",
     )
     options = parser.parse_args()
     output = (options.output or _ROOT / f"build/robot-gateway-{options.version}").absolute()
@@ -87,7 +87,7 @@ def _make(
     output.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".release-", dir=output.parent) as scratch:
         made, work = Path(scratch) / "made", Path(scratch) / "work"
-        for folder in ("wheels", "sdists", "sbom"):
+        for folder in ("wheels", "sdists", "robot", "sbom"):
             (made / folder).mkdir(parents=True)
         archived = made / f"robot-gateway-{version}.tar.gz"
         git.archive(_ROOT, commit, archived.name.removesuffix(".tar.gz"), archived)
@@ -97,7 +97,9 @@ def _make(
             stage(distribution, tree, work / "sources" / distribution.name)
             build(work / "sources" / distribution.name, made / "sdists", made / "wheels", commit.epoch_s)
         _say(f"downloading what they need on Python {', '.join(pythons)}")
-        download(tree / "requirements/console.txt", pythons, made / "wheels", commit.epoch_s)
+        console = [tree / "requirements/console.txt"]
+        download(console, pythons, ["x86_64"], made / "wheels")
+        build_sources(console, made / "wheels", commit.epoch_s)
         _say("installing them without a registry, and listing what was installed")
         for distribution in DISTRIBUTIONS:
             interpreter = install(distribution, version, made / "wheels", work / distribution.name)
@@ -107,6 +109,14 @@ def _make(
                 made / "sbom" / f"{distribution.stem}-{version}.cdx.json",
                 commit.epoch_s,
             )
+        _say("downloading what the robot's programs need without Docker, and installing it")
+        programs.download(tree, pythons, made / "robot")
+        sbom.write_of_environment(
+            programs.install(tree, made / "robot", work / "programs"),
+            tree / "pyproject.toml",
+            made / "sbom" / f"without_docker-{version}.cdx.json",
+            commit.epoch_s,
+        )
         if with_images:
             _add_images(made, version, commit)
         _write_texts(made, tree, version, commit)

@@ -1,5 +1,6 @@
 """scripts/release: the same bytes from the same commit, installed where no network is."""
 
+import itertools
 import json
 import os
 import shutil
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.bare_robot import bare_robot
 from tests.support.release import ROOT, VERSION, alone, clone, commit, git, release, released_repository
 
 pytestmark = pytest.mark.timeout(600)
@@ -134,6 +136,8 @@ def test_the_sbom_lists_what_is_installed_with_licences_and_dependencies(made: P
     wheels = {wheel.name.split("-")[0].lower().replace("_", "-") for wheel in (made / "wheels").iterdir()}
     assert listed["console"].keys() - wheels == set()
     assert "Apache-2.0" in json.dumps(listed["client"]["grpcio"]["licenses"])
+    robot = json.loads((made / f"sbom/without_docker-{VERSION}.cdx.json").read_text())
+    assert {"grpcio", "nkeys", "mcap"} <= {component["name"] for component in robot["components"]}
 
 
 IMAGE_SBOM = """
@@ -240,6 +244,38 @@ def test_install_console_takes_a_release_and_nothing_else(made: Path, tmp_path: 
     assert not list(link.resolve().parents[1].glob("lib/*/site-packages/PySide6*"))
     again = alone(script, "--release", made, "--without-video", HOME=str(home), XDG_DATA_HOME="")
     assert "up to date" in again.stderr
+
+
+ROBOTS_OWN = ("grpc", "pydantic", "nats", "nkeys", "mcap", "zstandard", "uvloop", "preview.app", "bridge.app")
+
+
+def test_a_robot_without_docker_is_installed_without_network(
+    made: Path, repository: Path, tmp_path: Path
+) -> None:
+    """Up to its first boot."""
+    archive = made / f"robot-gateway-{VERSION}.tar.gz"
+    subprocess.run(["tar", "-xf", archive, "-C", tmp_path], check=True, timeout=60)
+    script = tmp_path / f"robot-gateway-{VERSION}/scripts/install-robot"
+    (tmp_path / "robot").mkdir()
+    with bare_robot(tmp_path / "robot") as robot:
+        done = robot.run(script, "--release", made)
+        assert done.returncode == 0, done.stderr
+        assert "robot-gateway robot-preview start at the next boot" in done.stderr
+        current = Path("/opt/robot-gateway/current")
+        robot.output(current / "bin/python", "-c", IMPORT_ALL, json.dumps(ROBOTS_OWN), '["PySide6"]')
+        revision = git(repository, "rev-parse", "HEAD").strip()
+        settings = robot.output("cat", current / "share/robot/gateway.env").splitlines()
+        assert f"ROBOT_GATEWAY_REVISION={revision}" in settings
+        for program in ("gateway", "preview", "drive", "recorder", "bridge", "tap"):
+            robot.output(f"robot-{program}", "check")
+        assert robot.run(script, "--release", made).stderr == "install-robot: up to date\n"
+
+
+def test_robots_of_each_python_and_processor_have_their_wheels(made: Path) -> None:
+    names = [each.name for each in (made / "robot").iterdir()]
+    for python, machine in itertools.product(("cp311", "cp312", "cp313"), ("x86_64", "aarch64")):
+        found = [name for name in names if python in name and name.endswith(f"{machine}.whl")]
+        assert any(name.startswith("grpcio-") for name in found), (python, machine)
 
 
 def test_a_damaged_release_is_not_installed_from(made: Path, tmp_path: Path) -> None:
