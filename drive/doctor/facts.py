@@ -9,7 +9,7 @@ class TopicFacts:
     """One topic, without this project's own nodes.
 
     Attributes:
-        publishers, subscribers: their nodes, each once.
+        publishers, subscribers: their nodes, each once: "controller", or with a namespace "left/controller".
         types: message types that they name.
     """
 

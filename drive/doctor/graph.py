@@ -68,10 +68,14 @@ def _topic(node: Any, name: str, type_name: str) -> TopicFacts:
     return TopicFacts(
         name,
         type_name,
-        publishers=tuple(dict.fromkeys(each.node_name for each in publishers)),
-        subscribers=tuple(dict.fromkeys(each.node_name for each in subscribers)),
+        publishers=tuple(dict.fromkeys(map(_full_name, publishers))),
+        subscribers=tuple(dict.fromkeys(map(_full_name, subscribers))),
         types=frozenset(each.topic_type for each in (*publishers, *subscribers)),
     )
+
+
+def _full_name(endpoint: Any) -> str:
+    return f"{endpoint.node_namespace}/{endpoint.node_name}".lstrip("/")
 
 
 def _foreign(found: list[Any]) -> list[Any]:
@@ -98,6 +102,7 @@ def _ranks(parameters: Parameters, inputs: Sequence[TopicFacts]) -> tuple[Rank, 
     """Asks the nodes that take our velocities how they rank them; the multiplexer is the one that does."""
     for name in dict.fromkeys(name for each in inputs for name in each.subscribers):
         names = wanted(parameters.names(name, [INPUTS, LOCKS]))
-        if names and (ranks := ranks_in(parameters.values(name, names))):
+        namespace = name.rpartition("/")[0]
+        if names and (ranks := ranks_in(parameters.values(name, names), namespace)):
             return ranks
     return ()

@@ -8,11 +8,11 @@ from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import parameter_value_to_python
 
-_ANSWER_S: Final = 1.0
+_ANSWER_S: Final = 2.0
 
 
 class Parameters:
-    """Reads parameters of nodes; one without these services, or that does not answer, has none.
+    """Reads parameters of nodes, named without the first slash; one that does not answer has none.
 
     Args:
         node: of rclpy, to ask by.

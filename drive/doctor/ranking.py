@@ -20,22 +20,27 @@ def wanted(names: Iterable[str]) -> list[str]:
     return [name for name in names if name.rpartition(".")[2] in _VALUES][:MAX_VALUES]
 
 
-def ranks_in(values: Mapping[str, Any]) -> tuple[Rank, ...]:
-    """Returns the inputs and locks that a multiplexer's parameters describe as twist_mux's do."""
+def ranks_in(values: Mapping[str, Any], namespace: str = "") -> tuple[Rank, ...]:
+    """Returns the inputs and locks that a multiplexer's parameters describe as twist_mux's do.
+
+    Args:
+        values: the parameters.
+        namespace: of the multiplexer, without the first slash.
+    """
     entries = defaultdict[str, dict[str, Any]](dict)
     for name, value in values.items():
         entry, _, key = name.rpartition(".")
         entries[entry][key] = value
-    return tuple(rank for entry, each in entries.items() if (rank := _rank(entry, each)))
+    return tuple(rank for entry, each in entries.items() if (rank := _rank(entry, each, namespace)))
 
 
-def _rank(entry: str, values: Mapping[str, Any]) -> Rank | None:
+def _rank(entry: str, values: Mapping[str, Any], namespace: str) -> Rank | None:
     topic, priority, timeout_s = values.get("topic"), values.get("priority"), values.get("timeout")
     if not isinstance(topic, str) or not isinstance(priority, int):
         return None
     return Rank(
-        # A name without a slash is one of the node's namespace, and nodes of the root alone are asked.
-        f"/{topic.removeprefix('/')}",
+        # A name that does not begin with a slash is one of the node's namespace.
+        topic if topic.startswith("/") else f"/{namespace}/{topic}".replace("//", "/"),
         priority,
         timeout_s if isinstance(timeout_s, float) else 0.0,
         lock=entry.startswith(f"{LOCKS}."),
@@ -43,16 +48,30 @@ def _rank(entry: str, values: Mapping[str, Any]) -> Rank | None:
 
 
 def rank_findings(facts: GraphFacts) -> Iterator[Finding]:
-    """Yields what the ranks show; nothing where they are not known."""
+    """Yields what the ranks show, and of what lies behind a multiplexer that they do not."""
     ours = {topic.name for topic in facts.outputs}
     inputs = [each for each in facts.ranks if not each.lock]
     own = [each for each in inputs if each.topic in ours]
     others = [each for each in inputs if each.topic not in ours]
     if own:
         yield _priority(max(own, key=lambda each: each.priority), others)
-    for each in facts.ranks:
-        if each.lock and facts.lock and each.topic == facts.lock.name:
+    elif facts.mux_output and any(topic.subscribers for topic in facts.outputs):
+        yield _unknown("mux.priority", " and ".join(sorted(ours)))
+    if facts.lock and facts.lock.subscribers:
+        locks = [each for each in facts.ranks if each.lock and each.topic == facts.lock.name]
+        if not locks:
+            yield _unknown("mux.lock.priority", facts.lock.name)
+        for each in locks:
             yield from _lock(each, others)
+
+
+def _unknown(check: str, topic: str) -> Finding:
+    return note(
+        check,
+        f"no node that takes {topic} says how it ranks it",
+        "What outranks it can't be seen from here: the multiplexer is not twist_mux, or its topics are renamed",
+        "Look at the multiplexer's own configuration",
+    )
 
 
 def _priority(own: Rank, others: Iterable[Rank]) -> Finding:
@@ -62,7 +81,7 @@ def _priority(own: Rank, others: Iterable[Rank]) -> Finding:
     return note(
         "mux.priority",
         f"{_named(above)} does not rank below {own}",
-        "While it sends, neither a driver's velocities nor the zeros of a stop reach the base; only the lock "
+        "While it sends, a driver's velocities and the zeros of a stop may not reach the base; only the lock "
         "then ends its motion",
         "Give robot-drive's input the highest priority, unless a person at the robot is to outrank it",
     )

@@ -100,9 +100,17 @@ def test_what_is_wrong_is_said(facts: GraphFacts, check: str, verdict: Verdict, 
     assert finding.why
 
 
-def test_a_multiplexer_that_does_not_say_how_it_ranks_is_not_judged() -> None:
-    for ranks in ((), RANKS[:1]):
-        assert not {"mux.priority", "mux.lock.priority"} & verdicts(replace(GOOD, ranks=ranks)).keys()
+@pytest.mark.parametrize("ranks", [(), RANKS[:1]])
+def test_a_multiplexer_that_does_not_say_how_it_ranks_is_a_doubt(ranks: tuple[Rank, ...]) -> None:
+    found = verdicts(replace(GOOD, ranks=ranks))
+    for check in ("mux.priority", "mux.lock.priority"):
+        assert found[check].verdict is Verdict.NOTE
+        assert "says how it ranks it" in found[check].what
+
+
+def test_without_a_multiplexer_nothing_ranks() -> None:
+    facts = replace(GOOD, mux_output=None, lock=None, ranks=())
+    assert not {"mux.priority", "mux.lock.priority"} & verdicts(facts).keys()
 
 
 def test_of_several_inputs_of_our_own_the_highest_counts() -> None:
@@ -129,6 +137,7 @@ def test_the_ranks_are_read_out_of_the_parameters_of_twist_mux() -> None:
         Rank("/cmd_vel_nav", 1, 0.5),
         Rank("/lock", 255, lock=True),
     )
+    assert ranks_in(values, "left/arm")[0].topic == "/left/arm/cmd_vel_nav"
 
 
 @pytest.mark.parametrize(
