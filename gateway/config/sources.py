@@ -38,8 +38,9 @@ _TOPIC: Final = re.compile(r"(~/|/)?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_
 """A topic name as rcl_validate_topic_name accepts it, without substitutions."""
 _LONGEST_TOPIC: Final = 247
 """Of a full name: RMW_TOPIC_MAX_NAME_LENGTH."""
-_LONGEST_RELATIVE: Final = _LONGEST_TOPIC - len("/robot_gateway_doctor")
-"""Of a name that does not begin with /: the name of a node may be put in its front, at most the doctor's."""
+_PUT_IN_FRONT: Final[Mapping[str, int]] = {"/": 0, "~": len("/robot_gateway_doctor") - 1}
+"""By the beginning of a name, the characters that its full name has more: in place of ~ is a node's name, at
+most the doctor's; other relative names are those of the root namespace, and get a slash."""
 _LARGEST_IMAGE_PX: Final = 65_535
 """Of a side: more than any camera has, and within the contract's uint32."""
 _TYPE: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]*/msg/[A-Za-z][A-Za-z0-9_]*")
@@ -54,7 +55,7 @@ def _known_kind(kind: str) -> str:
 def _topic_name(topic: str) -> str:
     if not _TOPIC.fullmatch(topic):
         raise ValueError("a topic name of letters, digits, _ and /, /odometry/filtered for example")
-    most = _LONGEST_TOPIC if topic.startswith("/") else _LONGEST_RELATIVE
+    most = _LONGEST_TOPIC - _PUT_IN_FRONT.get(topic[0], 1)
     if len(topic) > most:
         raise ValueError(f"a topic name of at most {most} characters")
     return topic
