@@ -100,7 +100,7 @@ async def _kill(child: asyncio.subprocess.Process, what: tuple[str, ...]) -> Non
     try:
         await within(_KILL_S, child.wait())
     except TimeoutError:
-        with suppress(ProcessLookupError):  # It has just ended.
+        with suppress(OSError):  # It has just ended, or no descriptor is left: then it is not remembered.
             _held[what] = os.pidfd_open(child.pid)
 
 
