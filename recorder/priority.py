@@ -12,7 +12,8 @@ _SYS_IOPRIO_SET: Final = {"x86_64": 251, "aarch64": 30}
 """By machine: linux/arch/x86/entry/syscalls/syscall_64.tbl, include/uapi/asm-generic/unistd.h."""
 _IOPRIO_WHO_PROCESS: Final = 1
 _BEST_EFFORT_LOWEST: Final = 2 << 13 | 7
-"""IOPRIO_CLASS_BE, level 7 (ioprio_set(2)). Not idle: a disk that others keep busy must still take it."""
+"""IOPRIO_CLASS_BE, level 7 (ioprio_set(2)). Never idle, also where it was started so: a disk that others keep
+busy must still take what is recorded."""
 
 
 def step_back() -> None:

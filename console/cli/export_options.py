@@ -1,4 +1,4 @@
-"""What robotctl adds to errors of an export: the options that mend them, which the client library has not."""
+"""What robotctl adds to errors of an export: the options that help, which the client library does not have."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -31,7 +31,7 @@ _REMEDIES: Final = {
     "no quorum": "Most of the hub's servers have to be up; try again in 10 s",
     "no responders": _NOT_SET_UP,
     "missing": _NOT_SET_UP,
-    "too many": "Name one robot: robotctl fleet recordings ROBOT",
+    "too many": "Of recordings, name one robot: robotctl fleet recordings ROBOT",
     "full": "The hub has reached a limit; docs/fleet.md says how to make room",
 }
 _UNREACHABLE: Final = ("unreachable", "timeout", "no quorum")

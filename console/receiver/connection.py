@@ -31,6 +31,6 @@ def connect(
         if options.delivery is DeliveryChoice.DIRECT:
             raise UserError(
                 f"direct delivery is not possible: {error}",
-                "Type: sudo apt-get install libsrt1.5-gnutls, or choose the delivery auto",
+                "Type: sudo apt-get install libsrt1.5-gnutls, or choose delivery `auto`",
             ) from error
         return SrtConnection(address, queue, options, reason=str(error))
