@@ -37,9 +37,9 @@ REMARKS: Final[Mapping[tuple[str, ...], str]] = {
         " and the robot stops until a release and a new hold."
     ),
     ("video.cpu", "video.cpu_in_turns"): (
-        "what is above the reference is the pipe through which a frame's packets pass into a second pipeline"
-        " (`preview/pipeline/framing.py`), and the hop between the camera's and the encoder's thread. In turns,"
-        " what else the machine does differs between the two sides of a round."
+        "what is above the reference is the pipe through which a frame's packets pass into a second"
+        " pipeline (`preview/pipeline/framing.py`), and the hop between the camera's and the encoder's"
+        " thread. In turns, what else the machine does differs between the two sides of a round."
     ),
     ("video.first_frame",): (
         "the reference waits for its next key frame, one a second, so its single waits are spread over more"
@@ -105,8 +105,8 @@ OLDER: Final = (
     Older(
         ("siege.*",),
         frozenset({"86c63e59"}),
-        "measured with attackers from new addresses in the first turn alone, and `siege.p99` judged by the median"
-        " of the turns. Since then every turn has new ones, and the worst turn is judged.",
+        "measured with attackers from new addresses in the first turn alone, and `siege.p99` judged by"
+        " the median of the turns. Since then every turn has new ones, and the worst turn is judged.",
     ),
 )
 """Such a remark is no reason why a row misses its bar. It is on the page until the rows are measured anew."""

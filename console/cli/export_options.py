@@ -1,4 +1,4 @@
-"""What robotctl adds to errors of an export: the options that help, which the client library does not have."""
+"""What robotctl adds to errors of an export: its options that help, which the client library has not."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -69,7 +69,7 @@ def _unknown(check: str, topic: str) -> Finding:
     return note(
         check,
         f"no node that takes {topic} says how it ranks it",
-        "What outranks it can't be seen from here: the multiplexer is not twist_mux, or its topics are renamed",
+        "What outranks it can't be seen from here: it is not twist_mux, or its topics are renamed",
         "Look at the multiplexer's own configuration",
     )
 

@@ -62,7 +62,8 @@ def bare_robot(directory: Path) -> Iterator[BareRobot]:
         own = shlex.quote(str(directory / path.strip("/").replace("/", "-")))
         lines += [f"mkdir -p {own}", f"mount --bind {own} {path}"]
     etc = shlex.quote(str(directory / "etc"))
-    lines += [f"cp -a /etc {etc}", f"mount --bind {etc} /etc", "mkdir /run/lock"]
+    # Files of other programs may go while it is copied.
+    lines += [f"cp -a /etc {etc} || test -e {etc}/passwd", f"mount --bind {etc} /etc", "mkdir /run/lock"]
     lines += [f"mkdir -p {_ROS}/python/{name} && touch {_ROS}/python/{name}/__init__.py" for name in _MODULES]
     # A middleware that can be loaded: some library.
     library = "$(ldconfig -p | awk '$1 == \"libm.so.6\" { print $NF; exit }')"

@@ -66,14 +66,15 @@ def hostile(message: Message) -> None:
 
 
 def driven(requests: Iterator[bytes], _context: Any) -> Iterator[bytes]:
-    """A drive: the robot is stopped at first, then free. Of the requests only the number counts."""
+    """A drive: the robot is stopped at first, then free; each command is acknowledged by its own number."""
     opened = teleop_pb2.DriveOpened()
     hostile(opened)
     yield teleop_pb2.DriveResponse(opened=opened).SerializeToString()
-    for number, _ in enumerate(requests, 1):
+    for number, request in enumerate(requests, 1):
         state = teleop_pb2.DriveState()
         hostile(state)
-        state.phase, state.newest_sequence = teleop_pb2.DRIVE_PHASE_STOPPED, number
+        state.phase = teleop_pb2.DRIVE_PHASE_STOPPED
+        state.newest_sequence = teleop_pb2.DriveRequest.FromString(request).command.sequence
         if number > ARMED_AFTER:
             state.phase = teleop_pb2.DRIVE_PHASE_ARMED
             for field in ("inhibits", "problems", "stop"):

@@ -206,6 +206,8 @@ def test_a_reader_that_was_slow_gets_the_newest_picture(tap: RunningTap) -> None
             assert publisher.wait_for_all_acked(Duration(seconds=10)), "all have reached the tap"
             client.send(READY)
             assert received(client).width == 10 * newest
+        # A frame is counted after it was sent.
+        tap.wait_for(lambda state: state["topics"][TOPIC]["frames"] >= 2, "both are counted")
         assert tap.state()["topics"][TOPIC]["frames"] == 2
 
 

@@ -24,6 +24,7 @@ try:
     os.setpriority(os.PRIO_PROCESS, 0, int(sys.argv[1]))
 except PermissionError:
     pass  # Only root may go back to a better one.
+psutil.Process().ionice(psutil.IOPRIO_CLASS_BE, 0)
 found = {"before": priorities()}
 step_back()
 found["after"] = priorities()

@@ -67,7 +67,6 @@ async def test_an_admin_takes_the_robot_from_a_driver_who_holds(
                 await eventually(lambda: has_ended(first), bool, "the driver's session has ended")
                 assert isinstance(first.error, Refused)
                 assert first.error.reason == Reason.LEASE_LOST
-                assert "another driver has taken over" in str(first.error)
                 await second.ready(PATIENCE_S)
                 await eventually(lambda: is_at_rest(base), bool, "the base stands still, and stays so")
                 teleop = (await admin.status()).teleop
@@ -114,7 +113,11 @@ async def test_a_stop_is_accepted_on_a_connection_beyond_the_limit(
                 try:
                     await operator.ResetStop(ResetStopRequest(stop_id=found.stop.stop_id), **said)
                 except grpc.aio.AioRpcError as error:
-                    if error.code() is not grpc.StatusCode.FAILED_PRECONDITION:
+                    # Not yet, or the drive program has not confirmed it within a second.
+                    if error.code() not in {
+                        grpc.StatusCode.FAILED_PRECONDITION,
+                        grpc.StatusCode.UNAVAILABLE,
+                    }:
                         raise
             return bool(found.phase == DRIVE_PHASE_AVAILABLE)
 
