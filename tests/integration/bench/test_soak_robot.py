@@ -13,7 +13,8 @@ from bench.soak.robot import FAULTS, Fault, one_round
 from console.client import PreviewProfile
 from tests.support.waiting import wait_until
 
-pytestmark = [pytest.mark.ros, pytest.mark.gst]
+pytestmark = [pytest.mark.ros, pytest.mark.gst, pytest.mark.timed, pytest.mark.alone]
+"""Every call of an operator has the client's own deadline, 2 s, while all programs of a robot run."""
 
 PROGRAMS = {
     "robot-gateway",
