@@ -74,6 +74,8 @@ def test_ten_viewers_at_once(preview: RunningPreview) -> None:
     with ExitStack() as stack:
         for _ in range(9):
             stack.enter_context(player(preview.port))
+        # Before the watcher: srtsink listens with a backlog of one, and would refuse one of two at once.
+        viewers(preview, 9)
         watcher = stack.enter_context(Watcher(preview.port))
         viewers(preview, 10)
         watcher.wait_for_frames(30)
