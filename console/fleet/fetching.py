@@ -11,7 +11,7 @@ from console.client import results
 from console.client.errors import GatewayFailed, Refused, Unreachable
 from console.client.mapping.reader import read
 from console.client.results import RecordingFile
-from console.fleet.hub import recording_entries
+from console.fleet.hub import recording_entry
 from console.fleet.receipts import check_receipt
 from console.fleet.store import read_whole, usable
 from console.fleet.values import ReceiptCheck, Unreadable
@@ -96,15 +96,14 @@ async def read_verified(
         UserError: There is none, it is not verified, or its list of files is not the one that was.
         HubError: The hub does not answer.
     """
-    key = f"{robot}.{recording_id}"
-    entry = (await recording_entries(hub, robot)).get(key)
+    entry = await recording_entry(hub, robot, recording_id)
     if entry is None:
         raise UserError(
             f"the store has no recording {printable(recording_id)} of {printable(robot)}",
             _LIST,
             exit_code=ExitCode.USAGE,
         )
-    found = recording_of(key, entry.value)
+    found = recording_of(entry.key, entry.value)
     if isinstance(found, Unreadable):
         raise UserError(f"the hub's entry of {recording_id} is unreadable: {found.problem}")
     recording, _, message = found

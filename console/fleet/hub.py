@@ -80,6 +80,18 @@ async def recording_entries(hub: Hub, robot: str) -> dict[str, Entry]:
     return await hub.entries(names.RECORDINGS, f"{robot}.>" if robot else ">")
 
 
+async def recording_entry(hub: Hub, robot: str, recording_id: str) -> Entry | None:
+    """Returns the hub's entry of one recording; None when there is none, or can be none.
+
+    Raises:
+        HubError: The hub does not answer.
+    """
+    if not (names.ROBOT_NAME.fullmatch(robot) and names.RECORDING_ID.fullmatch(recording_id)):
+        return None  # As above.
+    key = f"{robot}.{recording_id}"
+    return (await hub.entries(names.RECORDINGS, key)).get(key)
+
+
 @dataclass(frozen=True, slots=True)
 class EventQuery:
     """Which events.

@@ -10,11 +10,11 @@ The robot is that of the request's subject, which the hub enforces. No recording
 robot can't send a file to the place of a receipt.
 """
 
-import re
 from dataclasses import dataclass
 from typing import Final
 
-_RECORDING: Final = re.compile(r"[A-Za-z0-9_-]{1,64}")
+from fleet.names import RECORDING_ID
+
 _FORBIDDEN: Final = frozenset('\\:*?"<>|')
 """What file systems, drives and streams give a meaning to: recordings are copied to many."""
 _MOST_BYTES: Final = 255
@@ -38,7 +38,7 @@ class RecordingKeys:
     recording_id: str
 
     def __post_init__(self) -> None:
-        if not _RECORDING.fullmatch(self.recording_id):
+        if not RECORDING_ID.fullmatch(self.recording_id):
             raise BadNameError("the recording's ID is not one: letters, digits, '-' and '_', at most 64")
 
     @property

@@ -9,7 +9,7 @@ import pytest
 from common.errors import UserError
 from console.client.errors import GatewayFailed, Refused, Unreachable
 from console.fleet.fetching import ReceiverUrls, read_verified, tls_context
-from console.fleet.hub import recording_entries
+from console.fleet.hub import recording_entries, recording_entry
 from fleet.errors import HubError, HubReason
 from fleet.receipt_keys import ReceiptSigner, digest_of, new_seed
 from omniseer.fleet.v1 import upload_pb2 as pb
@@ -42,7 +42,10 @@ class HubInMemory:
 
     async def entries(self, _bucket: str, keys: str) -> dict[str, Any]:
         self.subjects.append(keys)
-        return {key.replace("_", "."): SimpleNamespace(value=value) for key, value in self._entries.items()}
+        return {
+            (dotted := key.replace("_", ".")): SimpleNamespace(key=dotted, value=value)
+            for key, value in self._entries.items()
+        }
 
 
 def urls_of(answer: Any) -> tuple[ReceiverUrls, HubInMemory]:
@@ -109,6 +112,23 @@ async def test_one_robots_recordings_alone_are_read(robot: str, keys: str) -> No
 async def test_what_is_no_robots_name_never_becomes_a_subject(robot: str) -> None:
     hub: Any = HubInMemory()
     assert await recording_entries(hub, robot) == {}
+    assert hub.subjects == []
+
+
+async def test_one_recording_is_read_by_its_key_alone() -> None:
+    hub: Any = HubInMemory(r1_one=stored().SerializeToString())
+    entry = await recording_entry(hub, "r1", "one")
+    assert entry is not None
+    assert hub.subjects == ["r1.one"]
+
+
+@pytest.mark.parametrize(
+    ("robot", "recording_id"),
+    [("*", "one"), ("r1", "*"), ("r1", ">"), ("r1", "one.two"), ("r1", ""), ("r1", "x" * 65), ("r1", "a b")],
+)
+async def test_what_is_no_recordings_key_never_becomes_a_subject(robot: str, recording_id: str) -> None:
+    hub: Any = HubInMemory()
+    assert await recording_entry(hub, robot, recording_id) is None
     assert hub.subjects == []
 
 
