@@ -51,7 +51,9 @@ def test_every_service_is_hardened_and_bounded_in_every_overlay(overlay: str) ->
         assert "cap_add" not in service, name
     for name in ("gateway", "preview", "drive", "recorder", "tap", "bridge"):
         assert services[name]["restart"] == "unless-stopped"
-        assert services[name]["logging"]["options"] == {"max-size": "10m", "max-file": "3"}
+        log = services[name]["logging"]["options"]
+        assert (log["max-size"], log["max-file"]) == ("10m", "3")
+        assert log["mode"] == "non-blocking", "a disk that hangs would hold up the program"
         assert int(services[name]["mem_limit"]) <= 512 << 20
         assert services[name]["pids_limit"] <= 256
 
