@@ -1,8 +1,9 @@
 """A publisher in a process of its own: `python -m tests.support.publisher_program TOPIC HZ BYTES COUNT ...`.
 
-Publishes COUNT messages of std_msgs/msg/String with BYTES letters on each TOPIC (four arguments each), HZ
-times a second, as soon as each topic has a subscription; then prints how many it has published and waits for
-the end of its standard input.
+Publishes COUNT messages of std_msgs/msg/String with BYTES letters on each TOPIC (four arguments each): the
+first one as soon as each topic has a subscription, then prints "first" and waits for a line of its standard
+input, and the others HZ times a second. Then it prints how many it has published and waits for the end of
+its standard input.
 """
 
 import json
@@ -30,6 +31,10 @@ class _Job:
     published: int = 0
     due_s: float = 0.0
 
+    def publish(self) -> None:
+        self.publisher.publish(self.message)
+        self.published += 1
+
 
 def main(arguments: list[str]) -> None:
     context = Context()
@@ -42,6 +47,10 @@ def main(arguments: list[str]) -> None:
         publisher = node.create_publisher(String, topic, qos)
         jobs.append(_Job(publisher, 1 / float(hz), String(data="x" * int(size)), int(count)))
     _meet(jobs)
+    for job in jobs:
+        job.publish()
+    print("first", flush=True)
+    sys.stdin.readline()
     _publish(jobs)
     print(json.dumps([job.published for job in jobs]), flush=True)
     sys.stdin.read()
@@ -63,8 +72,7 @@ def _publish(jobs: list[_Job]) -> None:
     while waiting := [job for job in jobs if job.published < job.count]:
         job = min(waiting, key=lambda each: each.due_s)
         time.sleep(max(0.0, job.due_s - time.monotonic()))
-        job.publisher.publish(job.message)
-        job.published += 1
+        job.publish()
         job.due_s += job.period_s
 
 
