@@ -32,6 +32,8 @@ def test_a_recording_over_the_graph_opens_in_other_programs(tmp_path: Path) -> N
         started = program.call("StartRecording", pb.StartRecordingRequest(request_id="1", label="drive"))
         wait_until(lambda: talker.heard, "the recorder has subscribed")
         talker.publish(200)
+        # What is published is still on its way: a stop does not wait for it.
+        wait_until(lambda: program.state.status.messages_written >= 200, "200 messages")
         stopped = program.call("StopRecording", pb.StopRecordingRequest(request_id="2"))
         made = program.recording(started.recording.id)
         assert stopped.recording.state == made.state == pb.RECORDING_STATE_COMPLETE

@@ -101,7 +101,7 @@ def test_without_a_preview_it_waits_for_one(tmp_path: Path) -> None:
         assert "the preview does not serve it" in recording.tap.last_error
         with server(path, lambda: INFO + key_frame(), keeps_open=True):
             recording.wait_for(lambda: recording.tap.connected, "a connection")
-            recording.wait_for_frames(0)
+            recording.wait_for(lambda: recording.samples, "a frame")
             assert recording.tap.last_error == ""
 
 
@@ -127,7 +127,7 @@ def test_what_the_preview_says_about_missing_frames_is_a_problem_until_they_come
         recording.wait_for(lambda: recording.tap.problem == "no camera at /dev/video0", "the preview's words")
         assert recording.tap.last_error == ""
         with TapRecording(path) as later:
-            later.wait_for_frames(0)
+            later.wait_for(lambda: later.samples, "a frame")
             assert later.tap.problem == ""
 
 
