@@ -157,7 +157,8 @@ async def test_the_gap_of_a_failed_disk_covers_what_was_buffered(tmp_path: Path)
         await running.written(100)
         with files_of_at_most(200_000):
             handed_ns = time.time_ns()
-            source.send(100, size=20_000)
+            # One, which fails as a whole: of many, some might be on the disk before the others come.
+            source.send(size=2_000_000)
             await running.until(lambda: running.status_reader.running is None)
         cut = running.status_reader.newest
         assert cut
@@ -170,12 +171,14 @@ async def test_a_snapshot_tells_when_the_ring_could_not_be_written(tmp_path: Pat
         await running.until(lambda: running.status_reader.writes)
         source = Source(running.queue)
         source.send(10)
-        made = await running.operations.snapshot("1", SnapshotOptions(pre_s=10, post_s=3), "someone")
+        made = await running.operations.snapshot("1", SnapshotOptions(pre_s=10, post_s=60), "someone")
         assert made.recording
         with files_of_at_most(100_000):
             handed_ns = time.time_ns()
-            source.send(100, size=20_000)
+            source.send(size=2_000_000)
             await running.until(lambda: "the ring can't be written" in running.status_reader.last_error)
+        await running.until(lambda: running.status_reader.writes)
+        await running.operations.stop("2", made.recording.id)
         await running.until(lambda: not running.status_reader.snapshots_pending)
         found = running.status_reader.get(made.recording.id)
         (gap,) = [each for each in found.gaps if each.cause is GapCause.DISK]
@@ -479,8 +482,9 @@ async def test_a_deletion_that_the_disk_has_failed_ends_by_itself(
             patched.setattr(Path, "unlink", refuse)
             answer = await running.operations.delete("1", done.id, b"", force=False)
             assert answer.message.endswith("they are deleted later")
-        assert (folder / "data" / "000000.mcap").exists()
-        assert running.status_reader.recordings == []
+            # Before it is tried again, with success.
+            assert (folder / "data" / "000000.mcap").exists()
+            assert running.status_reader.recordings == []
         await running.until(lambda: not folder.exists())
 
 
