@@ -146,7 +146,19 @@ async def disconnects(peer: socket.socket) -> bool:
         return True
 
 
+@pytest.fixture
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both ends wait longer for each other: after 2 s on a busy machine the call would carry the chunks."""
+    for module in (
+        "recorder.rpc.exporter",
+        "recorder.rpc.export_connections",
+        "gateway.links.recorder.export_connection",
+    ):
+        monkeypatch.setattr(f"{module}.CONNECT_WITHIN_S", 20.0)
+
+
 @pytest.mark.parametrize("offset", [0, 1, CHUNK_BYTES, 1_000_001])
+@pytest.mark.usefixtures("patient")
 async def test_the_gateway_reads_what_the_call_would_carry(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, offset: int
 ) -> None:
@@ -159,6 +171,7 @@ async def test_the_gateway_reads_what_the_call_would_carry(
         assert len(recorder.handed) == 1
 
 
+@pytest.mark.usefixtures("patient")
 async def test_exports_at_once_have_a_connection_each(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -192,11 +205,12 @@ async def test_a_path_too_long_for_a_second_socket_makes_exports_slower_alone(
     assert "exports will be slower" in caplog.text
 
 
+@pytest.mark.usefixtures("patient")
 async def test_damage_and_deletion_end_the_call_with_the_reason(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async with robot(tmp_path, monkeypatch) as recorder:
-        exported = recorder.client.export(recorder.request(max_bytes_per_s=MIB), METADATA)
+        exported = recorder.client.export(recorder.request(max_bytes_per_s=MIB // 10), METADATA)
         await anext(exported)
         await anext(exported)
         assert recorder.handed
@@ -289,6 +303,7 @@ async def test_a_call_with_another_key_gets_its_chunks_at_once(
 @pytest.mark.parametrize(
     "settings", [{}, {"export": {"max_bytes_per_s": MIB}}], ids=["handed over", "over the call"]
 )
+@pytest.mark.usefixtures("patient")
 async def test_a_deleted_recording_is_closed_at_both_ends_though_nobody_reads(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, settings: dict[str, Any]
 ) -> None:
@@ -308,6 +323,7 @@ async def test_a_deleted_recording_is_closed_at_both_ends_though_nobody_reads(
         await eventually(found, lambda now: not now, "its blocks are free")
 
 
+@pytest.mark.usefixtures("patient")
 async def test_the_descriptor_is_for_reading_this_file_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -325,6 +341,7 @@ async def test_the_descriptor_is_for_reading_this_file_alone(
 
 
 @pytest.mark.timed
+@pytest.mark.usefixtures("patient")
 async def test_the_gateway_keeps_the_limit_of_an_export(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -370,11 +387,15 @@ async def test_the_gateway_takes_files_alone(tmp_path: Path, sent: bytes, what: 
     before = psutil.Process().num_fds()
     received = await handed_by(tmp_path / "socket", sent, descriptors)
     assert received == (b"", None)
-    assert psutil.Process().num_fds() == before, "a descriptor was kept"
+    # Of the whole process, in which something of an earlier test may end meanwhile.
+    assert psutil.Process().num_fds() <= before, "a descriptor was kept"
+    if what:
+        assert descriptors_of(tmp_path / what) == descriptors
     for each in descriptors:
         os.close(each)
 
 
+@pytest.mark.usefixtures("patient")
 async def test_the_gateway_reads_the_range_that_it_is_given(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"some bytes of a file")
     descriptor = os.open(tmp_path / "file", os.O_RDONLY)

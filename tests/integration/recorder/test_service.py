@@ -124,7 +124,7 @@ async def test_a_recording_deleted_while_it_is_exported(tmp_path: Path) -> None:
     async with served(tmp_path) as robot:
         made = await robot.recorded(3_000_000)
         request = pb.ExportRecordingRequest(
-            recording_id=made.id, file=made.files[0].name, max_bytes_per_s=1_000_000
+            recording_id=made.id, file=made.files[0].name, max_bytes_per_s=100_000
         )
         call = robot.stub.ExportRecording(request)
         parts = aiter(call)
