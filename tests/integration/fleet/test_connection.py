@@ -42,7 +42,8 @@ async def test_without_a_server_calls_fail_at_once() -> None:
         begin_s = time.monotonic()
         with pytest.raises(UnreachableError):
             await hub.publish_once("fleet.r1.ev.run.1", b"")
-        assert time.monotonic() - begin_s < 0.5
+        assert time.monotonic() - begin_s < 4, "it does not wait for an answer, which may take 5 s"
+        assert await hub.changed.wait_until(lambda: hub.link.reason is not None, 20)
         with pytest.raises(UnreachableError, match="can't be reached"):
             await hub.connected(1.0)
         assert hub.link.reason is HubReason.UNREACHABLE
@@ -132,7 +133,7 @@ async def test_an_answer_that_comes_too_late_costs_no_connection(servers: NatsSe
             servers.freeze(0)
             waiting = asyncio.ensure_future(session.subscribe("quiet", "", _ignore))
             await asyncio.sleep(0)
-            done, _ = await asyncio.wait([waiting], timeout=6)
+            done, _ = await asyncio.wait([waiting], timeout=30)
             assert isinstance(waiting.exception(), UnreachableError), done
             servers.thaw(0)
             acknowledgement = await session.request("fleet.r1.ev.run.1", b"", 5)
@@ -241,8 +242,12 @@ async def test_one_robot_has_a_share_of_the_requests_in_hand(servers: NatsServer
         assert sorted(await asyncio.gather(*pending)) == [b"busy"] * 4 + [b"done"] * 2
 
 
-async def test_a_consumer_that_the_server_has_not_heard_of_yet_is_waited_for(servers: NatsServers) -> None:
+async def test_a_consumer_that_the_server_has_not_heard_of_yet_is_waited_for(
+    servers: NatsServers, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """In a cluster, a node that has just started passes nothing on to a consumer that has just been made."""
+    # It is made in time, however long this machine stands still.
+    monkeypatch.setattr("fleet.consuming._KNOWN_WITHIN_S", 20.0)
     session = await Session.open(servers.urls[0], credentials=None, ca=None, inbox="_INBOX.x", name="")
     async with connect(FleetAddress(servers.urls)) as hub:
         await hub.connected(10)
@@ -253,7 +258,7 @@ async def test_a_consumer_that_the_server_has_not_heard_of_yet_is_waited_for(ser
             await asyncio.wait({first}, timeout=0.3)
             assert not first.done()
             await streams.add_command_consumer(hub, "r2")
-            assert (await asyncio.wait_for(first, 5)).payload == b"early"
+            assert (await asyncio.wait_for(first, 20)).payload == b"early"
     await session.close()
 
 
