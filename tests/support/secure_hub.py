@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from fleet.connection import FleetAddress
+from fleet.connection import FleetAddress, Hub
 from fleet.names import inbox_prefix
 from hub import administration
 from hub.creation import HubPlan, create
@@ -15,6 +15,8 @@ from hub.server_config import Node, Places
 from tests.support.nats_servers import SERVER, NatsServers
 
 _LOOPBACK = "127.0.0.1"
+_ANSWERS_WITHIN_S = 20.0
+"""A handshake over TLS takes seconds on a busy machine."""
 
 
 class SecureHub:
@@ -90,3 +92,17 @@ def secure_hub(directory: Path, nodes: int = 1, binary: Path | str = SERVER) -> 
         yield hub
     finally:
         hub.servers.close()
+
+
+async def first_answer(hub: Hub) -> None:
+    """Returns when there is a connection.
+
+    Raises:
+        HubError: the first attempt has failed.
+    """
+
+    def answered() -> bool:
+        return hub.link.connected or hub.link.reason is not None
+
+    assert await hub.changed.wait_until(answered, _ANSWERS_WITHIN_S), "the hub answers"
+    await hub.connected(0.0)

@@ -15,7 +15,7 @@ from fleet.serving import Request
 from fleet.session import Session
 from hub import administration
 from tests.support.nats_servers import DEBIAN_SERVER, SERVER
-from tests.support.secure_hub import SecureHub, secure_hub
+from tests.support.secure_hub import SecureHub, first_answer, secure_hub
 
 _CONNECT_S = 10.0
 _REVOKED_WITHIN_S = 5.0
@@ -301,7 +301,7 @@ async def test_a_revoked_robot_is_out_and_stays_out(hub: SecureHub) -> None:
         assert b'"revoked": true' in (await administrator.entries(names.ROBOTS))["c"].value
     async with connect(address) as again:
         with pytest.raises(RefusedError, match="does not accept the credentials"):
-            await again.connected(2.0)
+            await first_answer(again)
 
 
 async def test_a_robot_enrolled_again_has_new_keys_and_the_old_ones_end(hub: SecureHub) -> None:
@@ -310,7 +310,7 @@ async def test_a_robot_enrolled_again_has_new_keys_and_the_old_ones_end(hub: Sec
     await administration.enroll(hub.directory, "d", hub.path / "d", again=True)
     async with connect(replace(old, credentials=kept)) as hub_of_old:
         with pytest.raises(RefusedError):
-            await hub_of_old.connected(2.0)
+            await first_answer(hub_of_old)
     async with _connected(old) as robot:
         await robot.publish_once("fleet.d.ev.run.1", b"")
 
@@ -320,7 +320,7 @@ async def test_expired_credentials_are_refused(hub: SecureHub) -> None:
     address = hub.address(hub.path / "e" / "bridge.creds", names.inbox_prefix("e"))
     async with connect(address) as robot:
         with pytest.raises(RefusedError):
-            await robot.connected(2.0)
+            await first_answer(robot)
 
 
 async def test_a_server_without_tls_gets_no_credentials(thief: FleetAddress) -> None:
@@ -340,7 +340,7 @@ async def test_a_server_without_tls_gets_no_credentials(thief: FleetAddress) -> 
         url = f"tls://127.0.0.1:{server.sockets[0].getsockname()[1]}"
         async with connect(replace(thief, servers=(url,))) as robot:
             with pytest.raises(HubError) as refused:
-                await robot.connected(2.0)
+                await first_answer(robot)
     assert refused.value.reason is HubReason.UNREACHABLE
     assert "does not offer TLS" in str(refused.value)
     assert said == b""
