@@ -17,6 +17,7 @@ from hub.streams import add_command_consumer, set_up
 from omniseer.bridge.v1 import bridge_service_pb2 as pb
 from omniseer.fleet.v1.event_pb2 import DROP_REASON_OUTBOX_LOST, DropReason, EventBatch
 from omniseer.gateway.v1 import cloud_pb2
+from tests.support.answered import answered
 from tests.support.restartable_program import RestartableProgram
 from tests.support.waiting import wait_until
 
@@ -117,7 +118,7 @@ class BridgeProgram(RestartableProgram):
 
     @property
     def state(self) -> pb.WatchStateResponse:
-        return newest_state(self.socket)
+        return answered(lambda: newest_state(self.socket))
 
     @property
     def status(self) -> cloud_pb2.CloudStatus:

@@ -17,6 +17,7 @@ from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
 from omniseer.recorder.v1 import recorder_service_pb2_grpc as pb_grpc
 from recorder.rpc.client import newest_state
+from tests.support.answered import answered
 from tests.support.restartable_program import RestartableProgram
 from tests.support.waiting import wait_until
 
@@ -59,7 +60,7 @@ class RecorderProgram(RestartableProgram):
 
     @property
     def state(self) -> recorder_pb.WatchStateResponse:
-        return newest_state(self.socket)
+        return answered(lambda: newest_state(self.socket))
 
     def recording(self, recording_id: str) -> pb.Recording:
         """A recording with its files."""
