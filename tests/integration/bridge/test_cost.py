@@ -78,7 +78,7 @@ async def test_an_event_and_a_state_a_second_cost_a_hundredth_of_a_core_and_80_m
             print(
                 f"{cpu:.4f} of a core ({counted:.4f} counted), {rss / _MIB:.1f} MiB, {len(summaries)} states"
             )
-            found = await received(hub)
+            found = await eventually(lambda: received(hub), lambda now: len(now.events) >= _S, "all events")
         following.cancel()
     assert len(found.events) == _S
     assert len(summaries) >= _S - 2

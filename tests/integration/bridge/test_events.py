@@ -168,6 +168,7 @@ async def test_a_hub_that_is_gone_for_longer_than_the_outbox_holds(
     assert len(warnings) == 1200, "what matters more was kept"
 
 
+@pytest.mark.timed
 async def test_a_half_open_connection_is_given_up(
     tmp_path: Path, hub: Hub, gateway: EventServer, servers: NatsServers
 ) -> None:
@@ -188,6 +189,7 @@ async def test_a_half_open_connection_is_given_up(
     assert len(found.events) == 50
 
 
+@pytest.mark.timed
 async def test_an_uplink_that_works_for_a_hundredth_of_the_time(
     tmp_path: Path, hub: Hub, gateway: EventServer, servers: NatsServers
 ) -> None:

@@ -29,6 +29,8 @@ RECORDINGS = 6
 KILLS = 6
 _WITHIN_S = 150.0
 
+pytestmark = pytest.mark.timeout(240)
+
 
 @asynccontextmanager
 async def two_receivers(ground: Ground, directory: Path) -> AsyncIterator[list[ReceiverProgram]]:

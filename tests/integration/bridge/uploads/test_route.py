@@ -120,7 +120,8 @@ def test_names_are_resolved_and_an_address_without_a_route_is_passed_over(asking
 @needs_root
 def test_no_connection_is_made_through_an_interface_that_is_not_allowed(asking: Asking) -> None:
     allowed, *others = asking("10.1.0.9:9000", "10.3.0.9:9000", "both:9000", program=PUT)
-    assert allowed == "connecting"
+    # The kernel, too, gives up after three seconds in which no neighbour has answered.
+    assert allowed == "connecting" or "Connect call failed" in allowed
     for refused in others:
         assert "through wwan0; uploads are allowed through wlan*" in refused
 
