@@ -65,9 +65,11 @@ class StatusStream:
             if not self._watchers:
                 self._watched.clear()
                 await self._watched.wait()
-            # After a stall the beat starts anew: missed ticks are not made up for.
-            due_s = max(due_s + _TICK_S, self._clock())
-            await asyncio.sleep(due_s - self._clock())
+            due_s, now_s = due_s + _TICK_S, self._clock()
+            if due_s <= now_s:
+                # After a stall the beat starts anew: missed ticks are not made up for.
+                due_s = now_s + _TICK_S
+            await asyncio.sleep(due_s - now_s)
             self._tick += 1
             if any(each.pacing.may_be_due(self._tick) for each in self._watchers):
                 self._refresh()
@@ -82,13 +84,15 @@ class StatusStream:
         self._refresh_if_older_than(REUSE_S)
         with self._watching(min_interval_ms, with_detections) as watcher:
             while True:
-                yield self._newest(recipient, with_detections)
+                yield self._response(recipient, with_detections)
                 # The next one may have come due while this one was on its way.
                 if not self._due(watcher):
                     watcher.wake = loop.create_future()
                     await watcher.wake
                     watcher.wake = None
-                watcher.pacing.sent(self._tick, self._versions[with_detections])
+                # When the loop was held up, a newer one is sent, as at the next tick: it counts for that.
+                tick = self._tick + 1 if self._refresh_if_older_than(_TICK_S) else self._tick
+                watcher.pacing.sent(tick, self._versions[with_detections])
 
     @contextmanager
     def _watching(self, min_interval_ms: int, with_detections: bool) -> Iterator[_Watcher]:
@@ -112,16 +116,17 @@ class StatusStream:
         if changed or _detections_changed(before, self._snapshot):
             self._versions[True] += 1
 
-    def _refresh_if_older_than(self, seconds: float) -> None:
-        if self._clock() - self._snapshot.at_s > seconds:
+    def _refresh_if_older_than(self, seconds: float) -> bool:
+        """Returns whether it was older."""
+        older = self._clock() - self._snapshot.at_s > seconds
+        if older:
             self._refresh()
+        return older
 
     def _due(self, watcher: _Watcher) -> bool:
         return watcher.pacing.due(self._tick, self._versions[watcher.with_detections])
 
-    def _newest(self, recipient: Recipient, with_detections: bool) -> bytes:
-        # Older than a tick only for the first watcher after a while, or when the loop was held up.
-        self._refresh_if_older_than(_TICK_S)
+    def _response(self, recipient: Recipient, with_detections: bool) -> bytes:
         key = (recipient, with_detections)
         response = self._responses.get(key)
         if response is None:

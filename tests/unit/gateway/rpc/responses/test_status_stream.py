@@ -3,6 +3,7 @@
 import asyncio
 import time
 from collections.abc import AsyncIterator
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -14,13 +15,16 @@ from gateway.status.preview import Counters, PreviewState, PreviewView
 from gateway.status.snapshot import Identity, Programs, Rules, Setup, Snapshot, SourceRule, take
 from gateway.status.sources import DETECTIONS, ODOMETRY
 from gateway.status.values import Detection, Detections, Received, Velocity
+from gateway.status.watch_pacing import TICK_MS
 from omniseer.gateway.v1.robot_gateway_pb2 import WatchSystemStatusResponse
+from tests.support.virtual_time import VirtualTimeLoop, in_virtual_time
 
 CALLER = Recipient("10.0.0.1", sees_passphrase=False)
 PREVIEW = PreviewView(PreviewState.DISABLED, None, "", True, None, None, None, None, Counters())
 CUP = Detection(41, "cup", 0.9, "7", 10, 20, 30, 40)
 QUIET_S = 0.3
 """Several ticks, and less than the heartbeat."""
+INTERVAL_MS = 300
 
 
 class World:
@@ -101,3 +105,44 @@ async def test_before_the_first_detections_the_field_says_that_there_are_none() 
     response = await read(watch.responses(0, CALLER, with_detections=True))
     assert response.HasField("detections")
     assert not response.detections.available
+
+
+class Moving(World):
+    """Another velocity in each snapshot, dated by the clock of the loop; one is followed by a stall."""
+
+    def __init__(self, held_up_after: int, stall_s: float) -> None:
+        super().__init__()
+        self._held_up_after = held_up_after
+        self._stall_s = stall_s
+
+    def snapshot(self) -> Snapshot:
+        loop = asyncio.get_running_loop()
+        assert isinstance(loop, VirtualTimeLoop)
+        self.now_s = loop.time()
+        self.board[ODOMETRY] = Received(Velocity(self.taken / 10, 0.0, 0.0), self.now_s)
+        taken = super().snapshot()
+        if self.taken == self._held_up_after:
+            loop.call_soon(loop.spend, self._stall_s)
+        return taken
+
+
+@pytest.mark.parametrize("stall_ms", range(5, 400, 30))
+@pytest.mark.parametrize("before_ms", [0, 20, 40])
+@in_virtual_time
+async def test_a_loop_that_is_held_up_sends_nothing_sooner(before_ms: int, stall_ms: int) -> None:
+    """Before a response comes due, and when it is on its way: the beat may shift by less than one tick."""
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualTimeLoop)
+    watch = StatusStream(Moving(6, stall_ms / 1000), loop.time)
+    ticking = asyncio.create_task(watch.run())
+    loop.call_at((3 * INTERVAL_MS - before_ms) / 1000, loop.spend, stall_ms / 1000)
+    dated_s = []
+    async for response in watch.responses(INTERVAL_MS, CALLER):
+        dated_s.append(WatchSystemStatusResponse.FromString(response).monotonic_ns / 1e9)
+        if dated_s[-1] > 3:
+            break
+    ticking.cancel()
+    # The first interval begins between two ticks.
+    between_ms = [1000 * (later - earlier) for earlier, later in pairwise(dated_s)][1:]
+    assert min(between_ms) > INTERVAL_MS - TICK_MS
+    assert max(between_ms) < INTERVAL_MS + stall_ms + 2 * TICK_MS
