@@ -23,8 +23,11 @@ from tests.support.preview_double import Behaviour, PreviewDouble, serve_double
 if TYPE_CHECKING:
     import grpc
 
-SILENCE_S = 1.0
-APPLY_DEADLINE_S = 0.3
+SILENCE_S = 4.0
+APPLY_DEADLINE_S = 1.5
+"""Both longer than a busy machine may hold up a double that is well."""
+WATCHED_S = 2.0
+"""Several signs of life, of either double."""
 WITHIN_S = 15.0
 
 
@@ -216,7 +219,7 @@ async def test_a_frozen_service_is_noticed_and_the_same_process_is_sent_nothing_
     assert await link.wait_until_settled(link.request(ground.some), WITHIN_S)
     service.thawed.clear()
     await until(link, lambda: not reachable(link))
-    assert "no report for 1 s" in repr(link.view)
+    assert f"no report for {SILENCE_S:g} s" in repr(link.view)
     service.thawed.set()
     await connected(link)
     assert len(service.applied) == 1
@@ -228,7 +231,7 @@ async def test_a_request_that_is_not_answered_is_a_lost_service(ground: Ground, 
     service.thawed.clear()
     desired = link.request(ground.some)
     assert await link.wait_until_settled(desired, WITHIN_S)
-    assert "no answer to a request for 0.3 s" in repr(link.view)
+    assert f"no answer to a request for {APPLY_DEADLINE_S:g} s" in repr(link.view)
     service.thawed.set()
     await until(link, lambda: service.applied and reachable(link))
     assert await link.wait_until_settled(desired, WITHIN_S)
@@ -242,8 +245,8 @@ async def test_a_refused_request_is_not_repeated(ground: Ground, link: Any) -> N
     view = link.view
     assert ground.refusal in repr(view)
     assert reachable(link)
-    later = asyncio.get_running_loop().time() + 2 * SILENCE_S
-    await link.changes.wait_until(lambda: asyncio.get_running_loop().time() > later, 3 * SILENCE_S)
+    later = asyncio.get_running_loop().time() + WATCHED_S
+    await link.changes.wait_until(lambda: asyncio.get_running_loop().time() > later, 2 * WATCHED_S)
     assert len(service.applied) == 1, "though it has reported since then"
     assert link.view is view, "a report without a change makes no new view"
 
@@ -289,11 +292,13 @@ async def test_the_newest_of_many_requests_counts(ground: Ground, link: Any) -> 
     assert service.applied[-1].revision == requests[-1].revision
 
 
-async def test_a_request_cuts_a_pause_short(ground: Ground, link: Any) -> None:
-    await until(link, lambda: link.failures == 6)
-    # The pause that has begun now is 1 s long.
-    assert await link.wait_until_settled(link.request(ground.some), 0.8)
-    assert link.failures >= 7
+async def test_a_request_cuts_a_pause_short(ground: Ground, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("FIRST_PAUSE_S", "LONGEST_PAUSE_S"):
+        monkeypatch.setattr(f"gateway.links.watch.{name}", 10 * WITHIN_S)
+    async with running(ground.new_link()) as link:
+        await until(link, lambda: link.failures == 1)
+        assert await link.wait_until_settled(link.request(ground.some), WITHIN_S)
+        assert link.failures == 2
 
 
 async def test_connections_close_with_the_link() -> None:
