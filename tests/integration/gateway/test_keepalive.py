@@ -5,7 +5,7 @@ from pathlib import Path
 
 import grpc
 
-from tests.support.running_gateway import running_gateway
+from tests.support.running_gateway import Operator, running_gateway
 
 PING_EVERY_MS = 1100
 # The third ping too many ends a connection; this is time for five.
@@ -23,6 +23,8 @@ async def test_a_quiet_client_may_ping_every_second(tmp_path: Path) -> None:
         grpc.aio.insecure_channel(f"127.0.0.1:{operator.port}", options=options) as channel,
     ):
         await asyncio.wait_for(channel.channel_ready(), 10)
+        # A connection without a call is closed after a while for that, however it pings.
+        await Operator(channel, operator.port).status()
         left_ready = channel.wait_for_state_change(grpc.ChannelConnectivity.READY)
         done, _ = await asyncio.wait({asyncio.ensure_future(left_ready)}, timeout=QUIET_S)
         assert not done, f"the connection ended: {channel.get_state()}"
