@@ -19,7 +19,7 @@ from gateway.rpc.connections.accepted_sockets import AcceptedSockets
 from gateway.rpc.connections.blocklist import MAX_BLOCKED, MAX_TRUSTED, UNUSED_BURST
 from gateway.rpc.connections.guard import SCAN_EVERY_S
 from gateway.rpc.connections.packet_filter import ConnectPolicy
-from gateway.rpc.connections.refusal_delay import REFUSAL_DELAY_S, REFUSAL_SPACING_S
+from gateway.rpc.connections.refusal_delay import REFUSAL_SPACING_S
 from gateway.rpc.connections.shedding import MAX_ONE_IN
 from gateway.rpc.interceptors.auth import Auth
 from gateway.rpc.interceptors.turns import EXAMINED
@@ -221,8 +221,12 @@ def answered(crowd: Crowd) -> Callable[[], Awaitable[int]]:
     return look
 
 
-async def test_a_stop_of_a_viewer_does_not_wait_behind_its_wrong_ones(tmp_path: Path) -> None:
+async def test_a_stop_of_a_viewer_does_not_wait_behind_its_wrong_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """On a connection that a wrong token fills. A robot that does not drive refuses it with a reason."""
+    # So far apart that the way of the stop's answer takes the time of few of them, on a busy machine too.
+    monkeypatch.setattr("gateway.rpc.connections.refusal_delay.REFUSAL_SPACING_S", 0.1)
     robot = new_robot(tmp_path)
     _, login = robot.add(Role.VIEWER)
     async with guarded_gateway(robot):
@@ -230,7 +234,7 @@ async def test_a_stop_of_a_viewer_does_not_wait_behind_its_wrong_ones(tmp_path: 
         wrong = [
             asyncio.ensure_future(
                 stub.StopRobot(
-                    StopRobotRequest(), metadata=(("authorization", f"Bearer {WRONG_TOKEN}"),), timeout=10
+                    StopRobotRequest(), metadata=(("authorization", f"Bearer {WRONG_TOKEN}"),), timeout=60
                 )
             )
             for _ in range(4 * EXAMINED)
@@ -239,12 +243,12 @@ async def test_a_stop_of_a_viewer_does_not_wait_behind_its_wrong_ones(tmp_path: 
         refused, waiting = await asyncio.wait(wrong, return_when=asyncio.FIRST_COMPLETED)
         assert all(isinstance(each.exception(), grpc.aio.AioRpcError) for each in refused)
         assert waiting
-        began_s = time.monotonic()
         with pytest.raises(grpc.aio.AioRpcError) as seen:
-            await stub.StopRobot(StopRobotRequest(), metadata=login.metadata(), timeout=5)
-        took_s = time.monotonic() - began_s
+            await stub.StopRobot(StopRobotRequest(), metadata=login.metadata(), timeout=30)
+        left = sum(not each.done() for each in wrong)
         assert seen.value.code() is grpc.StatusCode.FAILED_PRECONDITION
-        assert took_s < REFUSAL_DELAY_S / 2
+        # More than are examined at a time: of those that had come before it, most still wait for their turn.
+        assert left > EXAMINED
         for each in wrong:
             each.cancel()
         await asyncio.gather(*wrong, return_exceptions=True)
