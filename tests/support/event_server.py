@@ -21,6 +21,7 @@ from omniseer.gateway.v1.robot_gateway_pb2 import (
     WatchSystemStatusResponse,
 )
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus
+from tests.support.free import free_tcp_port
 
 _STATUS_EVERY_S: Final = 1.0
 """As often as a gateway answers where nothing changes."""
@@ -36,7 +37,7 @@ class EventServer:
     def __init__(self, kept: int) -> None:
         self._kept = kept
         self._runs = 0
-        self.port = 0
+        self.port = free_tcp_port()
         self.happened: dict[str, int] = {}
         """How many events each run had."""
         self._status = SystemStatus()
