@@ -25,6 +25,7 @@ async def next_of(events: Any, kind: EventKind) -> Event:
     raise AssertionError("the stream ended")
 
 
+@pytest.mark.timed
 @pytest.mark.timeout(90)
 async def test_a_half_open_connection_is_freed_within_ten_seconds(tmp_path: Path) -> None:
     """The client's machine is gone: nobody closes the connection, nobody answers on it."""

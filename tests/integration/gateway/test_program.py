@@ -79,6 +79,7 @@ def test_without_ros_a_gateway_with_sources_says_what_to_install(tmp_path: Path)
     assert "scripts/setup" in done.stderr
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_ends_it_quickly_and_well(config: Path, tmp_path: Path, number: signal.Signals) -> None:
     log = tmp_path / "log"

@@ -94,6 +94,7 @@ async def test_an_interval_beyond_the_schemas_bound_is_refused(operator: Operato
     assert "min_interval_ms" in (seen.value.details() or "")
 
 
+@pytest.mark.timed
 async def test_who_does_not_read_is_not_written_for(operator: Operator) -> None:
     """What waits for a stalled reader is bounded by its connection, and what comes after is the newest."""
     options = (("grpc.use_local_subchannel_pool", 1), ("grpc.http2.bdp_probe", 0))

@@ -78,6 +78,7 @@ def stopped(client: Any) -> str:
     return ""
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize("headers", [GET_SYSTEM_STATUS, STOP_ROBOT], ids=["statuses", "stops"])
 def test_strangers_take_no_room_of_stops(tmp_path: Path, headers: bytes) -> None:
     with guarded_program(tmp_path, tmp_path / "home") as robot, robot.client() as client:

@@ -9,6 +9,7 @@ from typing import Any
 
 import grpc
 import psutil
+import pytest
 
 from gateway.links.bridge.requests import BURST
 from omniseer.bridge.v1 import bridge_service_pb2 as bridge_pb
@@ -67,6 +68,7 @@ class HostileHub(BridgeDouble):
                 request.snapshot.label = "fine"
 
 
+@pytest.mark.timed
 async def test_a_hostile_hub_makes_the_gateway_do_nothing_else(tmp_path: Path) -> None:
     hub = HostileHub()
     audit = tmp_path / "audit.jsonl"
