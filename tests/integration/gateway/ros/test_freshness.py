@@ -4,6 +4,7 @@ import statistics
 import threading
 import time
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import psutil
@@ -75,8 +76,10 @@ def test_a_silent_topic_ages_and_is_fresh_again_when_it_returns(tmp_path: Path) 
     with intake(DEFAULT_SOURCES, board), simulated_robot(tmp_path) as robot:
         wait_until(lambda: age_s(board) < 0.2, "fresh odometry")
         robot.change(silent=["odometry"])
-        wait_until(lambda: age_s(board) > 1.0, "odometry to become stale")
-        assert time.monotonic() - newest(board, specs.VISION).at_s < 1.0, "only the silenced topic is silent"
+        wait_until(
+            lambda: age_s(board) > 1.0 and time.monotonic() - newest(board, specs.VISION).at_s < 1.0,
+            "odometry, and only that, to become stale",
+        )
         robot.change(silent=[])
         wait_until(lambda: age_s(board) < 0.2, "fresh odometry again")
 
@@ -120,13 +123,16 @@ def test_a_topic_every_five_seconds_keeps_its_value_between(tmp_path: Path) -> N
     """tests/integration/gateway/ros/test_rates.py has one of ten seconds, through the whole program."""
     board = Board()
     with intake([ODOMETRY], board), simulated_robot(tmp_path, "--odometry-hz", "0.2"):
-        first = wait_until(lambda: board[specs.ODOMETRY], "the first message", within_s=40)
-        second = wait_until(
-            lambda: now if (now := board[specs.ODOMETRY]) is not first else None,
-            "the second",
-            within_s=40,
-        )
-    assert second.at_s - first.at_s == pytest.approx(5, abs=0.5)
+        arrived_s: list[float] = []
+
+        def five_seconds_apart() -> bool:
+            """Any two that follow each other: a busy machine may hold one of them up."""
+            now = board[specs.ODOMETRY]
+            if now and now.at_s not in arrived_s:
+                arrived_s.append(now.at_s)
+            return any(later - earlier == pytest.approx(5, abs=0.5) for earlier, later in pairwise(arrived_s))
+
+        wait_until(five_seconds_apart, "two messages five seconds apart", within_s=40)
 
 
 def test_the_board_holds_what_an_ordinary_subscriber_saw_last(

@@ -73,6 +73,7 @@ def look(gateway: GatewayProgram) -> Look:
     return Look(answered_s, status.health.odom_age_ms, stale)
 
 
+@pytest.mark.timed
 @pytest.mark.usefixtures("ros_domain")
 def test_a_flood_of_detections_starves_neither_sources_nor_operators(tmp_path: Path) -> None:
     """Thirty pictures a second of five thousand objects each: as much as shared memory carries."""

@@ -9,7 +9,7 @@ import yaml
 
 from common import ros_transport
 from console.client.blocking import GatewayClient
-from console.client.errors import Unreachable
+from console.client.errors import DeadlineExceeded, Unreachable
 from tests.support.free import free_tcp_port
 from tests.support.other_user import GATEWAY, ORDINARY, directory_of, running_as, simulated_robot_as
 from tests.support.waiting import wait_until
@@ -43,7 +43,7 @@ def test_the_gateway_hears_the_robots_nodes_whoever_they_run_as(
     def odometry_arrives() -> bool:
         try:
             odometry = operator.status().odometry
-        except Unreachable:
+        except (Unreachable, DeadlineExceeded):
             return False
         return odometry.available and not odometry.stale
 
