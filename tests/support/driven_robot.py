@@ -236,6 +236,16 @@ async def held(session: DriveSession, speed_mps: float) -> AsyncIterator[None]:
         session.release()
 
 
+def was_held(session: DriveSession) -> None:
+    """The end of a part of an attempt whose holds have to be one.
+
+    Raises:
+        DisturbedError: one was not renewed in time, which is a release.
+    """
+    if session.lapsed:
+        raise DisturbedError("the hold was not renewed in time, which is a release")
+
+
 async def stop_by(
     viewer: AsyncGatewayClient, operator: AsyncGatewayClient, base: Base
 ) -> tuple[float, float]:

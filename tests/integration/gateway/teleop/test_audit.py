@@ -1,34 +1,50 @@
 """What the robot's audit log keeps of driving: each time of motion, each stop, and who was refused."""
 
+import asyncio
 import json
 import os
 import signal
-from collections.abc import Iterator
-from contextlib import suppress
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any
 
 import pytest
 
 from console.client import AsyncGatewayClient, DriveSession, GatewayError, NotAllowed, Refused
 from gateway.access.role import Role
-from tests.support.driven_robot import BY_EYE, in_motion
+from tests.support.driven_robot import BY_EYE, held, in_motion, was_held
 from tests.support.eventually import eventually
 from tests.support.guarded_program import Guarded, guarded_program
 from tests.support.heard import Base
 from tests.support.running_drive import listening_base, running_drive
+from tests.support.undisturbed import DisturbedError, no_stall, same_worker, undisturbed_async
 
 # Timed: on a machine that is busy with other tests, a late command would end the motion.
 pytestmark = [pytest.mark.ros, pytest.mark.timed]
 SPEED_MPS = 0.1
+RELEASED = "released"
+"""What ends no motion here, unless a stall does."""
 
 
-@pytest.fixture
-def guarded(module_ros_domain: int, tmp_path: Path) -> Iterator[tuple[Guarded, Base]]:  # noqa: ARG001  # for its effect
-    with listening_base() as base, running_drive(tmp_path) as drive:
+@contextmanager
+def guarded(directory: Path) -> Iterator[tuple[Guarded, Base]]:
+    with listening_base() as base, running_drive(directory) as drive:
         teleop = {"socket": str(drive.socket), "line_of_sight": True}
-        with guarded_program(tmp_path, tmp_path, teleop=teleop) as robot:
+        with guarded_program(directory, directory, teleop=teleop) as robot, same_worker(drive):
             yield robot, base
+
+
+async def driven_undisturbed(directory: Path, attempt: Callable[[Path], Awaitable[None]]) -> None:
+    """Makes attempts, each in a directory of its own, until no stall has ended a motion or begun another."""
+
+    async def begun() -> None:
+        own = Path(mkdtemp(dir=directory))
+        with no_stall():
+            await attempt(own)
+
+    await undisturbed_async(begun)
 
 
 def records(file: Path) -> list[dict[str, Any]]:
@@ -43,10 +59,16 @@ def motions(directory: Path) -> list[dict[str, Any]]:
     return [each for each in kept if each["action"] == "Drive" and " m, " in each["request"]]
 
 
-async def test_who_drove_who_stopped_and_who_was_refused(
-    guarded: tuple[Guarded, Base], tmp_path: Path
-) -> None:
-    robot, base = guarded
+@pytest.mark.usefixtures("module_ros_domain")
+async def test_who_drove_who_stopped_and_who_was_refused(tmp_path: Path) -> None:
+    async def attempt(directory: Path) -> None:
+        with guarded(directory) as (robot, base):
+            await driven_stopped_and_refused(robot, base, directory)
+
+    await driven_undisturbed(tmp_path, attempt)
+
+
+async def driven_stopped_and_refused(robot: Guarded, base: Base, directory: Path) -> None:
     (anna, anna_id), (vic, _) = robot.added("anna", Role.OPERATOR), robot.added("vic", Role.VIEWER)
     async with (
         AsyncGatewayClient(robot.target, credentials=anna) as driver,
@@ -59,10 +81,11 @@ async def test_who_drove_who_stopped_and_who_was_refused(
         await eventually(enabled, bool, "driving is enabled")
         async with driver.drive(BY_EYE) as session:
             await in_motion(driver, session, base, SPEED_MPS)
-            stopped = await viewer.stop_robot("a child on the track")
+            async with held(session, SPEED_MPS):
+                stopped = await viewer.stop_robot("a child on the track")
+                was_held(session)
             with pytest.raises(NotAllowed):
                 await viewer.reset_stop(stopped.stop.stop_id)
-            session.release()
 
             async def reset() -> bool:
                 try:
@@ -73,37 +96,43 @@ async def test_who_drove_who_stopped_and_who_was_refused(
 
             await eventually(reset, bool, "the stop is reset")
             await in_motion(driver, session, base, SPEED_MPS)
-            robot.admin.revoke(anna_id)
-
-            await eventually(lambda: has_ended(session), bool, "the driver's access has ended")
+            async with held(session, SPEED_MPS):
+                await asyncio.to_thread(robot.admin.revoke, anna_id)
+                await eventually(lambda: has_ended(session), bool, "the driver's access has ended")
+                was_held(session)
 
         async def recorded() -> list[dict[str, Any]]:
-            return motions(tmp_path)
+            return motions(directory)
 
-        first, second = await eventually(recorded, lambda it: len(it) == 2, "both times of motion")
+        found = await eventually(recorded, lambda it: len(it) >= 2, "both times of motion")
+        if any(each["answer"] == RELEASED for each in found):
+            raise DisturbedError("a hold was not renewed in time, while it began")
+    first, second = found
     assert {(each["who"], each["role"]) for each in (first, second)} == {("anna", "operator")}
     assert all(each["request"].endswith("by test") for each in (first, second))
     assert "vic" in first["answer"], "stopped by the viewer"
     assert "access" in second["answer"]
-    kept = records(tmp_path / "credentials/audit.jsonl")
+    kept = records(directory / "credentials/audit.jsonl")
     # The client sends a stop on two connections.
     stops = [each for each in kept if each["action"] == "StopRobot"]
     assert {(each["who"], each["role"], each["result"]) for each in stops} == {("vic", "viewer", "accepted")}
     assert all("a child on the track" in each["request"] for each in stops)
-    refused = records(tmp_path / "credentials/audit-refused.jsonl")
+    refused = records(directory / "credentials/audit-refused.jsonl")
     assert {(each["who"], each["action"]) for each in refused} >= {("vic", "ResetStop")}
 
 
-async def test_a_motion_that_a_killed_gateway_left_is_recorded_by_the_next(
-    module_ros_domain: int,  # noqa: ARG001  # for its effect
-    tmp_path: Path,
-) -> None:
-    first, second = tmp_path / "first", tmp_path / "second"
-    for directory in (first, second):
-        directory.mkdir()
-    with listening_base() as base, running_drive(tmp_path) as drive:
+@pytest.mark.usefixtures("module_ros_domain")
+async def test_a_motion_that_a_killed_gateway_left_is_recorded_by_the_next(tmp_path: Path) -> None:
+    await driven_undisturbed(tmp_path, motion_left_by_a_killed_gateway)
+
+
+async def motion_left_by_a_killed_gateway(directory: Path) -> None:
+    first, second = directory / "first", directory / "second"
+    for each in (first, second):
+        each.mkdir()
+    with listening_base() as base, running_drive(directory) as drive:
         teleop = {"socket": str(drive.socket), "line_of_sight": True}
-        with guarded_program(first, first, teleop=teleop) as robot:
+        with guarded_program(first, first, teleop=teleop) as robot, same_worker(drive):
             anna, _ = robot.added("anna", Role.OPERATOR)
             async with AsyncGatewayClient(robot.target, credentials=anna) as driver:
                 with suppress(GatewayError):
