@@ -50,6 +50,11 @@ def shown(tap: RunningTap, directory: Path, **settings: Any) -> Iterator[tuple[R
             yield preview, eye
 
 
+def off_s(pts_s: float, published: RosCamera) -> float:
+    """How far a time of presentation is from the nearest stamp; it wraps, as the stream's does."""
+    return min(abs(math.remainder(pts_s - HOUR_S - stamp, WRAP_S)) for stamp in published.captured_s)
+
+
 def camera(actual: pb.ActualState, name: str) -> tuple[str, str]:
     found = next(each for each in actual.cameras if each.name == name)
     return pb.CameraState.Name(found.state).removeprefix("CAMERA_STATE_"), found.error
@@ -62,8 +67,7 @@ def test_a_topic_is_shown_and_its_stamps_are_the_capture_times(tap: RunningTap, 
         # The capture times go on once these stamps are later than those before.
         wait_until(lambda: 200 < preview.running().measurement.last_frame_age_ms < 1000, "the age")
         units = analyse(record(preview.port, 1.0)).access_units
-        captured = [unit.pts / 90_000 - HOUR_S for unit in units]
-        errors = [min(abs(each - stamp) for stamp in published.captured_s) for each in captured]
+        errors = [off_s(unit.pts / 90_000, published) for unit in units]
         assert len(errors) > 10
         print(f"{len(errors)} frames, {max(errors) * 1e6:.0f} us between stamp and PTS at the most")
         assert max(errors) < 0.001
@@ -339,13 +343,7 @@ def test_a_camera_whose_stamps_lag_takes_over_when_its_time_has_come(tap: Runnin
             colours = [each.colour for each in eye.seen[begin:] if each.colour != "mixed"]
             assert colours == sorted(colours), "green, then red for good"
             assert lag_s - 1 < eye.longest_gap_s(begin) < lag_s + 1, "as long as the stamps lag"
-            errors = [
-                min(
-                    abs(math.remainder(each.pts_s - HOUR_S - stamp, WRAP_S)) for stamp in published.captured_s
-                )
-                for each in eye.seen[begin:]
-                if each.colour == "red"
-            ]
+            errors = [off_s(each.pts_s, published) for each in eye.seen[begin:] if each.colour == "red"]
             assert max(errors) < 0.001, "each is as old as it is"
         assert preview.running().counters == pb.Counters(starts=1)
         assert camera(preview.running(), "arm") == ("LIVE", "")
