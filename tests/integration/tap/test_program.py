@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -102,6 +103,7 @@ def test_it_is_healthy_while_it_serves(tap: RunningTap, tmp_path: Path) -> None:
     assert "Start it: robot-tap serve" in dead.stderr
 
 
+@pytest.mark.timed
 def test_the_doctor_looks_at_every_image_topic(tap: RunningTap, tmp_path: Path) -> None:
     depth = picture()
     depth.encoding = "32FC1"
@@ -234,14 +236,16 @@ def test_no_more_frames_than_configured_are_taken(ros_domain: int, tmp_path: Pat
         client = TapClient(tap.socket, TOPIC)
         try:
             os.close(wait_until(lambda: client.receive(1), "the first frame").memory)
-            before, frames = published.published, 0
+            before, frames, begun_s = published.published, 0, time.monotonic()
             while published.published < before + 200:
                 if frame := client.receive(1):
                     os.close(frame.memory)
                     frames += 1
+            took_s = time.monotonic() - begun_s
         finally:
             client.close()
-    assert 12 <= frames <= 22, "of two seconds"
+    # Two seconds, and those that publisher, tap or client stood still with the machine.
+    assert 5 <= frames <= 10 * took_s + 2
 
 
 def to_the_end(client: TapClient) -> None:
