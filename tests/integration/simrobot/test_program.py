@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from tempfile import mkdtemp
 
 import pytest
 
@@ -24,6 +25,7 @@ from gateway.status.sources import (
 )
 from gateway.status.values import CommandSource, DiagnosticLevel
 from tests.support.boards import has_all, newest
+from tests.support.promise import keeps
 from tests.support.ros import simulated_robot
 from tests.support.waiting import wait_until
 
@@ -127,14 +129,19 @@ def test_drivers_components_and_modes_change_while_it_runs(tmp_path: Path) -> No
         )
 
 
+@pytest.mark.timed
 @pytest.mark.usefixtures("ros_domain")
 def test_it_ends_within_two_seconds_of_sigterm(tmp_path: Path) -> None:
-    with simulated_robot(tmp_path) as robot:
-        started = time.monotonic()
-        robot.process.terminate()
-        assert robot.process.wait(30) == 0
-        assert time.monotonic() - started < 2.0
-        assert not robot.control.exists()
+    def took_s() -> float:
+        with simulated_robot(Path(mkdtemp(dir=tmp_path))) as robot:
+            asked_s = time.monotonic()
+            robot.process.terminate()
+            assert robot.process.wait(30) == 0
+            ended_s = time.monotonic()
+            assert not robot.control.exists()
+        return ended_s - asked_s
+
+    keeps(2.0, "s from SIGTERM to the end", took_s)
 
 
 @pytest.mark.usefixtures("ros_domain")
