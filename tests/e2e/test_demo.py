@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.free import free_udp_port
+from tests.support.free import free_tcp_port, free_udp_port
 from tests.support.waiting import wait_until
 
 ROOT = Path(__file__).parents[2]
@@ -99,9 +99,12 @@ class Place:
             return "health ok" in self.out.read_text()
 
         wait_until(up, "the system is up and healthy", UP_WITHIN_S)
-        programs = self.programs()
-        assert set(programs) == set(NAMES)
-        return programs
+        # A worker that was silent for too long is being replaced.
+        return wait_until(
+            lambda: programs if set(programs := self.programs()) == set(NAMES) else None,
+            "all of them run, and nothing else",
+            UP_WITHIN_S,
+        )
 
     def wait_until_gone(self) -> None:
         """Nothing runs here any more."""
@@ -127,10 +130,7 @@ def place(ros_domain: int) -> Iterator[Place]:
 @contextmanager
 def interactive(place: Place) -> Iterator["subprocess.Popen[str]"]:
     """The demo without --check, on ports of its own."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        grpc_port = probe.getsockname()[1]
-    with place.start("--grpc-port", str(grpc_port), "--srt-port", str(free_udp_port())) as demo:
+    with place.start("--grpc-port", str(free_tcp_port()), "--srt-port", str(free_udp_port())) as demo:
         try:
             yield demo
         finally:
