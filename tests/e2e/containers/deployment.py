@@ -5,7 +5,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import datetime
 from functools import partial
@@ -15,7 +15,8 @@ from typing import Any
 from testcontainers.compose import DockerCompose
 
 from console.client.blocking import GatewayClient
-from console.client.errors import Unreachable
+from console.client.errors import DeadlineExceeded, GatewayError, Unreachable
+from console.client.options import ClientOptions
 from console.client.results import SystemStatus
 from console.credentials import Credentials
 from tests.support.engine import ROOT, TAG
@@ -24,6 +25,8 @@ from tests.support.waiting import wait_until
 
 SERVICES = ("gateway", "preview")
 _GUARDED = (*SERVICES, "recorder", "tap", "bridge")
+_PATIENT = ClientOptions(answer_within_s=10.0)
+"""No test here is about a client's deadline, and gateways may stand still with the machine for seconds."""
 # Devices, and the kernel's own trees.
 _RUNTIME = ("/proc", "/sys", "/dev")
 
@@ -55,7 +58,7 @@ class Deployment:
 
     def client(self, shown: Credentials | None = None) -> GatewayClient:
         """An operator, and what they show."""
-        return GatewayClient(self.target, credentials=shown)
+        return GatewayClient(self.target, _PATIENT, shown)
 
     def run(self, *words: str, check: bool = True) -> subprocess.CompletedProcess[str]:
         """`docker compose ...` on this project."""
@@ -133,13 +136,44 @@ class Deployment:
         return wait_until(lambda: ready(robot), "odometry, vision and the preview reach the operator", 40)
 
 
+@contextmanager
+def answers_are_due() -> Iterator[None]:
+    """A block in which a call that fails fails the test, as what does not hold does."""
+    try:
+        yield
+    except GatewayError as error:
+        raise AssertionError(f"{type(error).__name__}: {error}") from error
+
+
+def answered(robot: GatewayClient) -> SystemStatus | None:
+    """The status; None while the gateway does not answer."""
+    try:
+        return robot.status()
+    except (Unreachable, DeadlineExceeded):
+        return None
+
+
 def ready(robot: GatewayClient) -> SystemStatus | None:
     """The status when all is there, None before."""
-    try:
-        status = robot.status()
-    except Unreachable:
-        return None
-    return status if status.health.ready and status.preview.service_reachable else None
+    status = answered(robot)
+    return status if status and status.health.ready and status.preview.service_reachable else None
+
+
+def status_with(
+    robot: GatewayClient, holds: Callable[[SystemStatus], bool], what: str, within_s: float = 40.0
+) -> SystemStatus:
+    """Waits until something holds of the status, and returns it."""
+
+    def asked() -> SystemStatus | None:
+        status = answered(robot)
+        return status if status and holds(status) else None
+
+    return wait_until(asked, what, within_s)
+
+
+def is_healthy(status: SystemStatus) -> bool:
+    """Whether the robot has no fault at all."""
+    return status.health.summary == "robot healthy"
 
 
 @contextmanager

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from console.client.results import PreviewState
-from tests.e2e.containers.deployment import Deployment, demo_overlay, deployed
+from console.client.results import PreviewState, SystemStatus
+from tests.e2e.containers.deployment import Deployment, demo_overlay, deployed, status_with
 from tests.support.waiting import wait_until
 from tests.support.watcher import Watcher
 
@@ -87,5 +87,8 @@ def test_full_disks_stop_neither_status_nor_video(own_demo: Deployment) -> None:
             viewer.wait_for_frames(30)
         # The volume of the socket stays full, because the gateway holds it.
         own_demo.run("restart", "preview")
-        wait_until(lambda: robot.status().preview.state is PreviewState.RUNNING, "the preview is back", 30)
-        assert robot.status().health.ready
+        status_with(robot, is_back, "the preview is back, and all else is well", 60)
+
+
+def is_back(status: SystemStatus) -> bool:
+    return status.preview.state is PreviewState.RUNNING and status.health.ready

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from common.ca import new_ca
+from console.client.blocking import GatewayClient
 from console.client.errors import GatewayError, NotAllowed, NotTrusted, Unreachable
 from console.client.results import PreviewState
 from console.credentials import Credentials
@@ -19,7 +20,16 @@ from console.receiver.errors import StreamRefusedError
 from console.robots.login import parse_login
 from gateway.rpc.connections.admission import MAX_PENDING
 from tests.e2e.containers.credentials import ADD, added, knows, typed
-from tests.e2e.containers.deployment import Deployment, demo_overlay, deployed, docker, mounts, writable
+from tests.e2e.containers.deployment import (
+    Deployment,
+    demo_overlay,
+    deployed,
+    docker,
+    is_healthy,
+    mounts,
+    status_with,
+    writable,
+)
 from tests.support.engine import ROOT, TAG
 from tests.support.receiver import Receiver
 from tests.support.robotctl import robotctl
@@ -39,6 +49,7 @@ REVOKE = "docker compose run --rm -T credentials revoke anna"
 LIST = "docker compose run --rm -T credentials list"
 READ_AUDIT = f"docker compose exec gateway cat {AUDIT}/audit.jsonl"
 READ_REFUSED = f"docker compose exec gateway cat {AUDIT}/audit-refused.jsonl"
+UP_WITHIN_S = 60.0
 KEPT_AWAY = 6
 """Attempts of half a second: longer than the first block of an address lasts, shorter than the second."""
 HEALTH = "docker compose exec gateway python -m common.healthcheck unix:/tmp/health.sock preview"
@@ -90,7 +101,7 @@ def guarded(
         assert up.returncode == 0, up.stderr + deployment.logs("gateway-config")
         anna, ben = added(deployment, "anna", "operator"), added(deployment, "ben", "viewer")
         with deployment.client(ben) as robot:
-            wait_until(lambda: knows(robot), "the gateway knows its new credentials")
+            wait_until(lambda: knows(robot), "the gateway knows its new credentials", UP_WITHIN_S)
             deployment.wait_for_status(robot)
         yield Guarded(deployment, refused, told, gateways_then, begun, anna, ben)
 
@@ -124,9 +135,17 @@ FILTERS += "packet_filter.attach(socket.create_server(('127.0.0.1', 0)), packet_
 
 def reason(deployment: Deployment, shown: Credentials | None) -> str:
     """Why the status is refused."""
-    with deployment.client(shown) as robot, pytest.raises(GatewayError) as caught:
+    with deployment.client(shown) as robot:
+        return refusal(robot)
+
+
+def refusal(robot: GatewayClient) -> str:
+    """The same of a client's next call; empty where it is not refused."""
+    try:
         robot.status()
-    return caught.value.reason or type(caught.value).__name__
+    except GatewayError as error:
+        return error.reason or type(error).__name__
+    return ""
 
 
 @pytest.mark.parametrize("command", [UP, INIT, ADD, REVOKE, LIST, READ_AUDIT, READ_REFUSED, HEALTH])
@@ -173,7 +192,7 @@ def test_a_login_is_all_that_goes_to_standard_output_and_works_on_a_laptop(
     (tmp_path / "dora.login").write_text(done.stdout, encoding="utf-8")
     here, target = {"XDG_CONFIG_HOME": str(tmp_path)}, guarded.deployment.target
     with guarded.deployment.client(login.credentials) as robot:
-        wait_until(lambda: knows(robot), "the gateway knows its new credential")
+        wait_until(lambda: knows(robot), "the gateway knows its new credential", UP_WITHIN_S)
     kept = robotctl("login", "lab2", target, str(tmp_path / "dora.login"), **here)
     assert kept.returncode == 0, kept.stderr
     status = robotctl("status", "--json", **here)
@@ -201,7 +220,7 @@ def test_nobody_gets_in_who_is_not_known(guarded: Guarded) -> None:
     assert reason(robot, Credentials(token=anna.token)) == Unreachable.__name__
     assert reason(robot, replace(anna, ca_certificate=foreign)) == NotTrusted.__name__
     with robot.client(anna) as known:
-        assert known.status().health.summary == "robot healthy"
+        status_with(known, is_healthy, "all is well with the robot")
 
 
 def test_a_viewer_looks_on_an_operator_switches_and_both_are_in_the_audit_log(guarded: Guarded) -> None:
@@ -248,11 +267,11 @@ def test_revoking_takes_effect_in_a_gateway_that_goes_on(guarded: Guarded) -> No
     before = robot.inspect("gateway")["State"]["StartedAt"]
     cora = added(robot, "cora", "operator")
     with robot.client(cora) as over, robot.client(guarded.ben) as other:
-        wait_until(lambda: knows(over), "the gateway knows its new credential")
+        wait_until(lambda: knows(over), "the gateway knows its new credential", UP_WITHIN_S)
         done = typed(robot, REVOKE.replace("anna", "cora"))
         assert re.fullmatch(r"revoked: [0-9a-f]{12}, operator cora", done.stdout.strip()), done.stderr
-        wait_until(lambda: not knows(over), "cora is refused", 5)
-        assert reason(robot, cora) == "CREDENTIAL_REVOKED"
+        # No answer in time is no refusal.
+        wait_until(lambda: refusal(over) == "CREDENTIAL_REVOKED", "cora is refused")
         other.status()
     assert robot.inspect("gateway")["State"]["StartedAt"] == before
     assert robot.restarts("gateway") == 0
@@ -300,7 +319,7 @@ def test_an_address_that_connects_again_and_again_costs_others_nothing(guarded: 
     )
     with robot.client(guarded.anna) as operator:
         said = docker("run", *stranger, "-c", STRANGER)
-        wait_until(lambda: operator.status().health.summary == "robot healthy", "all is well with the robot")
+        status_with(operator, is_healthy, "all is well with the robot")
     in_a_row, held, still_open = map(int, said.split())
     assert still_open <= MAX_PENDING // 2
     assert (in_a_row == KEPT_AWAY) is permitted
@@ -343,8 +362,8 @@ def test_credentials_and_audit_log_outlast_the_container(guarded: Guarded, words
         operator.disable_preview()
         before = wait_until(lambda: guarded.audit("anna"), "the record is written")
         robot.run(*words)
-        wait_until(lambda: knows(operator), "the gateway is back and knows its credentials")
+        wait_until(lambda: knows(operator), "the gateway is back and knows its credentials", UP_WITHIN_S)
         operator.disable_preview()
         wait_until(lambda: len(guarded.audit("anna")) > len(before), "one record more")
         assert guarded.audit("anna")[: len(before)] == before
-    wait_until(lambda: typed(robot, HEALTH).returncode == 0, "both serve")
+    wait_until(lambda: typed(robot, HEALTH).returncode == 0, "both serve", UP_WITHIN_S)

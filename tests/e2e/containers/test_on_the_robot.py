@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from console.client import GatewayClient, PreviewState, Unreachable
-from console.client.results import RecorderState, StreamEndpoint
+from console.client import DeadlineExceeded, GatewayClient, PreviewState, Unreachable
+from console.client.results import RecorderState, StreamEndpoint, SystemStatus
 from console.receiver.address import StreamAddress
 from console.receiver.errors import StreamRefusedError
-from tests.e2e.containers.deployment import Deployment, deployed
+from tests.e2e.containers.deployment import Deployment, deployed, status_with
 from tests.support.helper import helper
 from tests.support.other_user import ORDINARY, simulated_robot_as
 from tests.support.receiver import Receiver
@@ -49,7 +49,7 @@ def stream_of(operator: GatewayClient) -> StreamEndpoint:
     """Where to watch a preview that runs."""
 
     def running() -> StreamEndpoint | None:
-        with suppress(Unreachable):
+        with suppress(Unreachable, DeadlineExceeded):
             preview = operator.enable_preview().preview
             return preview.endpoint if preview.state is PreviewState.RUNNING else None
         return None
@@ -120,20 +120,20 @@ def test_nodes_of_another_user_reach_the_operator_and_the_recorder(
         monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         with simulated_robot_as(ORDINARY), deployment.client() as operator:
 
-            def recorder_is_idle() -> bool:
-                recording = operator.status().recording
+            def recorder_is_idle(status: SystemStatus) -> bool:
+                recording = status.recording
                 return recording is not None and recording.state is RecorderState.IDLE
 
-            def messages_are_written() -> bool:
-                recording = operator.status().recording
+            def messages_are_written(status: SystemStatus) -> bool:
+                recording = status.recording
                 return recording is not None and recording.messages_written > 0
 
             deployment.compose.start()
             deployment.wait_for_status(operator)
-            wait_until(recorder_is_idle, "the recorder is idle", 60)
+            status_with(operator, recorder_is_idle, "the recorder is idle", 60)
             begun = robotctl_process("--target", deployment.target, "record", "start", "--json")
             assert begun.returncode == 0, begun.stderr
-            wait_until(messages_are_written, "messages are recorded", 30)
+            status_with(operator, messages_are_written, "messages are recorded", 30)
 
 
 @pytest.mark.usefixtures("images")
