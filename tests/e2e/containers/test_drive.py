@@ -3,7 +3,7 @@
 import json
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -11,12 +11,20 @@ from typing import Any
 import pytest
 
 from console.client.blocking import GatewayClient
-from console.client.errors import GatewayError, Refused
+from console.client.errors import GatewayError
 from console.client.results import DrivePhase
-from tests.e2e.containers.deployment import Deployment, demo_overlay, deployed, mounts, writable
+from tests.e2e.containers.deployment import (
+    Deployment,
+    answers_are_due,
+    demo_overlay,
+    deployed,
+    mounts,
+    writable,
+)
 from tests.support.driver_program import SPEED_MPS, driver
 from tests.support.driving import Observer
 from tests.support.robotctl import robotctl_process
+from tests.support.undisturbed import no_stall, undisturbed
 from tests.support.waiting import wait_until
 
 # Timed: while a driver has the robot, 60 ms without a heartbeat stop it, and other tests take as much.
@@ -46,9 +54,25 @@ def deployment(
 @pytest.fixture
 def driven(deployment: Deployment) -> Deployment:
     """The same, and the robot is not stopped. The engine's own health checks come too rarely to wait for."""
+    free(deployment)
+    return deployment
+
+
+def free(deployment: Deployment) -> None:
+    """Waits until the robot can be driven, and resets what stops it."""
     with deployment.client() as robot:
         wait_until(lambda: is_available(robot), "the robot can be driven", UP_WITHIN_S)
-    return deployment
+
+
+def drives_undisturbed(deployment: Deployment, attempt: Callable[[], None]) -> None:
+    """Makes attempts with a robot that can be driven, until no stall of the machine explains what fails."""
+
+    def begun() -> None:
+        free(deployment)
+        with no_stall(), answers_are_due():
+            attempt()
+
+    undisturbed(begun)
 
 
 def is_available(robot: GatewayClient) -> bool:
@@ -57,7 +81,7 @@ def is_available(robot: GatewayClient) -> bool:
     if teleop and teleop.stop:
         try:
             robot.reset_stop(teleop.stop.stop_id)
-        except Refused:
+        except GatewayError:
             return False
     return bool(teleop and teleop.phase is DrivePhase.AVAILABLE)
 
@@ -68,6 +92,12 @@ def teleop_of(robot: GatewayClient) -> Any:
         return robot.status().teleop
     except GatewayError:
         return None
+
+
+def stop_of(robot: GatewayClient) -> Any:
+    """The stop of a robot that is connected and stopped, else None."""
+    teleop = teleop_of(robot)
+    return teleop.stop if teleop and teleop.phase is DrivePhase.STOPPED else None
 
 
 def speed_mps(robot: GatewayClient) -> float:
@@ -85,7 +115,10 @@ def processes(deployment: Deployment) -> dict[str, int]:
     """Those of the drive program by their part: guard of the container, guard, worker."""
     found = {}
     for pid in deployment.pids("drive"):
-        words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
+        try:
+            words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
+        except (FileNotFoundError, ProcessLookupError):  # It has just ended.
+            continue
         if b"common.guard" in words and b"tini" not in words[0]:
             found["container"] = pid
         elif b"worker" in words:
@@ -95,53 +128,65 @@ def processes(deployment: Deployment) -> dict[str, int]:
     return found
 
 
+def worker_of(deployment: Deployment) -> int:
+    """The worker's process; one that was silent for too long is being replaced."""
+    return wait_until(lambda: processes(deployment).get("worker"), "a worker", UP_WITHIN_S)
+
+
 def observer_of(driven: Deployment) -> Observer:
     """Reads the drive program's own socket, by the way into the container's files."""
-    worker = processes(driven)["worker"]
-    return Observer(Path(f"/proc/{worker}/root/run/robot-drive/drive.sock"))
+    return Observer(Path(f"/proc/{worker_of(driven)}/root/run/robot-drive/drive.sock"))
 
 
 def test_it_drives_and_anyone_stops_it(driven: Deployment) -> None:
-    with driver(driven.target), driven.client() as robot:
-        wait_until(lambda: speed_mps(robot) > SPEED_MPS / 2, "the base moves, by its odometry")
-        assert teleop_of(robot).phase is DrivePhase.DRIVING
-        stopped = robotctl_process("--target", driven.target, "stop", "--reason", "a test")
-        assert stopped.returncode == 0, stopped.stderr
-        wait_until(lambda: speed_mps(robot) == 0.0, "the base stands still")
-        teleop = teleop_of(robot)
-        assert (teleop.phase, teleop.stop.reason) == (DrivePhase.STOPPED, "a test")
+    def attempt() -> None:
+        with driver(driven.target), driven.client() as robot:
+            wait_until(lambda: speed_mps(robot) > SPEED_MPS / 2, "the base moves, by its odometry")
+            assert robot.status().teleop.phase is DrivePhase.DRIVING
+            stopped = robotctl_process("--target", driven.target, "stop", "--reason", "a test")
+            assert stopped.returncode == 0, stopped.stderr
+            wait_until(lambda: speed_mps(robot) == 0.0, "the base stands still")
+            teleop = robot.status().teleop
+            assert teleop.phase is DrivePhase.STOPPED
+            assert teleop.stop
+            assert teleop.stop.reason == "a test"
+
+    drives_undisturbed(driven, attempt)
 
 
 def test_a_gateway_that_is_killed_leaves_a_stopped_robot(driven: Deployment) -> None:
-    with closing(observer_of(driven)) as observer:
-        with driver(driven.target):
-            driven.signal_all("gateway", signal.SIGKILL)
-            stopped = observer.phase_is("STOPPED")
-        assert (stopped.vx_mps, stopped.vy_mps, stopped.wz_rad_s) == (0, 0, 0)
-        assert "the driver was lost while driving" in stopped.stop.reason
-    with driven.client() as robot:
-        found = wait_until(
-            lambda: (it := teleop_of(robot)) and it.stop, "the next gateway reports it", UP_WITHIN_S
-        )
-        assert found.stop_id == stopped.stop.stop_id
+    def attempt() -> None:
+        with closing(observer_of(driven)) as observer:
+            with driver(driven.target):
+                driven.signal_all("gateway", signal.SIGKILL)
+                stopped = observer.phase_is("STOPPED")
+            assert (stopped.vx_mps, stopped.vy_mps, stopped.wz_rad_s) == (0, 0, 0)
+            assert "the driver was lost while driving" in stopped.stop.reason
+        with driven.client() as robot:
+            found = wait_until(
+                lambda: (it := teleop_of(robot)) and it.stop, "the next gateway reports it", UP_WITHIN_S
+            )
+            assert found.stop_id == stopped.stop.stop_id
+
+    drives_undisturbed(driven, attempt)
 
 
 def test_a_stop_outlives_a_restart_of_the_drive_container(driven: Deployment) -> None:
-    with driven.client() as robot:
-        before = robot.stop_robot("before the restart").stop
-        driven.run("restart", "drive")
-        wait_until(
-            lambda: teleop_of(robot).phase is DrivePhase.STOPPED, "connected again, and stopped", UP_WITHIN_S
-        )
-        after = teleop_of(robot).stop
-        assert (after.stop_id, after.by, after.reason) == (before.stop_id, before.by, before.reason)
-        wait_until(lambda: is_available(robot), "reset", UP_WITHIN_S)
-        with driver(driven.target):
-            wait_until(lambda: speed_mps(robot) > SPEED_MPS / 2, "it drives again", UP_WITHIN_S)
+    def attempt() -> None:
+        with driven.client() as robot:
+            before = robot.stop_robot("before the restart").stop
+            driven.run("restart", "drive")
+            after = wait_until(lambda: stop_of(robot), "connected again, and stopped", UP_WITHIN_S)
+            assert (after.stop_id, after.by, after.reason) == (before.stop_id, before.by, before.reason)
+            wait_until(lambda: is_available(robot), "reset", UP_WITHIN_S)
+            with driver(driven.target):
+                wait_until(lambda: speed_mps(robot) > SPEED_MPS / 2, "it drives again", UP_WITHIN_S)
+
+    drives_undisturbed(driven, attempt)
 
 
 def test_it_is_hardened_and_survives_its_guard(driven: Deployment) -> None:
-    worker = processes(driven)["worker"]
+    worker = worker_of(driven)
     status = dict(
         line.split(":\t", 1)
         for line in Path(f"/proc/{worker}/status").read_text(encoding="ascii").splitlines()
@@ -154,18 +199,23 @@ def test_it_is_hardened_and_survives_its_guard(driven: Deployment) -> None:
     assert writable(worker) == {"/tmp", "/run/robot-drive", "/var/lib/robot-drive", "/dev/shm"}
     assert "ro" in mounts(worker)["/"]
 
-    restarts = driven.restarts("drive")
-    with driver(driven.target):
-        os.kill(processes(driven)["guard"], signal.SIGKILL)
-        wait_until(lambda: driven.restarts("drive") > restarts, "the engine starts it again", UP_WITHIN_S)
-    heard = heard_by_the_base(driven)
-    assert heard["zero_s"] - heard["moved_s"] < RESTART_TAKES_S, "the worker had time for its zeros"
-    # The engine asks the same only every 30 s.
-    health = ("exec", "drive", "python", "-m", "drive.health")
-    wait_until(lambda: driven.run(*health, check=False).returncode == 0, "it is healthy again", UP_WITHIN_S)
-    with driven.client() as robot:
-        wait_until(lambda: teleop_of(robot).stop, "the next start finds a stop", UP_WITHIN_S)
-        assert teleop_of(robot).stop.by == "robot-drive"
+    def attempt() -> None:
+        restarts = driven.restarts("drive")
+        with driver(driven.target):
+            os.kill(processes(driven)["guard"], signal.SIGKILL)
+            wait_until(lambda: driven.restarts("drive") > restarts, "the engine starts it again", UP_WITHIN_S)
+        heard = heard_by_the_base(driven)
+        assert heard["zero_s"] - heard["moved_s"] < RESTART_TAKES_S, "the worker had time for its zeros"
+        # The engine asks the same only every 30 s.
+        health = ("exec", "drive", "python", "-m", "drive.health")
+        wait_until(
+            lambda: driven.run(*health, check=False).returncode == 0, "it is healthy again", UP_WITHIN_S
+        )
+        with driven.client() as robot:
+            stop = wait_until(lambda: stop_of(robot), "the next start finds a stop", UP_WITHIN_S)
+            assert stop.by == "robot-drive"
+
+    drives_undisturbed(driven, attempt)
 
 
 def test_its_limits_are_in_force_and_it_goes_before_no_other_program(deployment: Deployment) -> None:
@@ -174,5 +224,5 @@ def test_its_limits_are_in_force_and_it_goes_before_no_other_program(deployment:
     assert (limits["Memory"], limits["PidsLimit"]) == (256 << 20, 128)
     assert limits["NanoCpus"] == min(1.5, os.cpu_count() or 1) * 1e9
     assert limits["CpuShares"] == 4096
-    worker = wait_until(lambda: processes(deployment).get("worker"), "a worker", UP_WITHIN_S)
+    worker = worker_of(deployment)
     assert int(Path(f"/proc/{worker}/oom_score_adj").read_text(encoding="ascii")) <= 0

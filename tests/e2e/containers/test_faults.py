@@ -1,15 +1,24 @@
 """What robots do to software: programs killed and stopped from outside, in the middle of a stream."""
 
+import functools
 import os
 import signal
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from console.client.results import PreviewProfile, PreviewState
-from tests.e2e.containers.deployment import Deployment, demo_overlay, deployed, udp_ports
+from tests.e2e.containers.deployment import (
+    Deployment,
+    answers_are_due,
+    demo_overlay,
+    deployed,
+    udp_ports,
+)
 from tests.e2e.containers.lookout import Lookout
+from tests.support.undisturbed import no_stall, undisturbed
 from tests.support.waiting import wait_until
 from tests.support.watcher import Watcher
 
@@ -20,6 +29,21 @@ NOTICED_WITHIN_S = 3.0
 SILENT_WITHIN_S = 11.0
 # Far below the two seconds after which a client gives up: an answer from memory never waits for the preview.
 ANSWERED_WITHIN_S = 1.0
+
+
+def begun_anew(test: Callable[[Deployment], None]) -> Callable[[Deployment], None]:
+    """A test that begins anew, as after the start, where a stall of the machine explains what has failed."""
+
+    @functools.wraps(test)
+    def begun(demo: Deployment) -> None:
+        def attempt() -> None:
+            demo.reset()
+            with no_stall(), answers_are_due():
+                test(demo)
+
+        undisturbed(attempt)
+
+    return begun
 
 
 def restarted_s(deployment: Deployment, service: str, restarts: int) -> float:
@@ -43,6 +67,7 @@ def first_picture_s(viewer: Watcher, since_s: float) -> float:
 
 
 @pytest.mark.timed
+@begun_anew
 def test_a_killed_preview_is_reported_and_comes_back_by_itself(demo: Deployment) -> None:
     with demo.client() as robot, Lookout(robot) as lookout, Watcher(demo.preview_port) as viewer:
         robot.enable_preview(PreviewProfile.BALANCED)
@@ -67,6 +92,7 @@ def test_a_killed_preview_is_reported_and_comes_back_by_itself(demo: Deployment)
 
 
 @pytest.mark.timed
+@begun_anew
 def test_a_stopped_preview_is_noticed_and_taken_back(demo: Deployment) -> None:
     with demo.client() as robot, Lookout(robot) as lookout, Watcher(demo.preview_port) as viewer:
         robot.enable_preview(PreviewProfile.LOW_BW)
@@ -88,6 +114,7 @@ def test_a_stopped_preview_is_noticed_and_taken_back(demo: Deployment) -> None:
 
 
 @pytest.mark.timed
+@begun_anew
 def test_a_preview_that_hangs_is_restarted(demo: Deployment) -> None:
     """Documented: after 11 s without a heartbeat. Docker alone would leave it as it is, unhealthy."""
     with demo.client() as robot, Lookout(robot) as lookout:
@@ -99,6 +126,7 @@ def test_a_preview_that_hangs_is_restarted(demo: Deployment) -> None:
 
 
 @pytest.mark.timed
+@begun_anew
 def test_a_killed_gateway_leaves_the_stream_alone(demo: Deployment) -> None:
     """Viewers keep their picture: the preview goes on for timeouts.without_gateway_s, 30 s here."""
     with demo.client() as robot, Watcher(demo.preview_port) as viewer:
