@@ -265,7 +265,7 @@ def test_a_service_that_was_started_by_hand_comes_along(robot: Robot) -> None:
 def test_a_release_that_does_not_become_healthy_is_left_by_itself(robot: Robot) -> None:
     robot.begin()
     before = robot.snapshot()
-    failed = robot.upgrade(robot.release("9.1.0", healthy=False), within_s=8)
+    failed = robot.upgrade(robot.release("9.1.0", healthy=False), within_s=20)
     assert failed.returncode == 1
     assert "9.1.0 does not become healthy: going back to 1.0.0" in failed.stderr
     assert "1.0.0 is in use again, as before" in failed.stderr
@@ -346,7 +346,7 @@ def test_an_upgrade_that_was_killed_is_finished_by_the_next_command(robot: Robot
         os.killpg(program.pid, signal.SIGKILL)
         program.wait(10)
     assert marker.read_text() == "9.1.0 1.0.0\n"
-    finished = robot.upgrade("--rollback", within_s=8)
+    finished = robot.upgrade("--rollback", within_s=20)
     assert "a change from 1.0.0 to 9.1.0 was interrupted: finishing it" in finished.stderr
     assert "1.0.0 is in use again" in finished.stderr
     assert robot.running() == "1.0.0"
