@@ -25,8 +25,12 @@ from preview.encoders.catalogue import CATALOGUE
 from preview.encoders.properties import configure
 from preview.values import Profile
 from tests.support.udp_link import Impairment
+from tests.support.undisturbed import no_stall, undisturbed
 
 pytestmark = pytest.mark.gst
+
+WATCH_S = 3.0
+"""Longer than a camera or a viewer stands still with the machine: a window without frames is no figure."""
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +47,7 @@ def robot(source: Camera, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
 
 @pytest.mark.parametrize("ours", [False, True])
 def test_a_cell_of_the_latency(source: Camera, robot: product.Robot, ours: bool) -> None:
-    found = latency.measure(latency.Cell(ours, ours), source, robot, settle_s=0.5, watch_s=1.0)
+    found = latency.measure(latency.Cell(ours, ours), source, robot, settle_s=0.5, watch_s=WATCH_S)
     # Less than the SRT latency is impossible: the stamp or a clock would be wrong.
     assert 0 < found.median_ms <= found.p99_ms
     assert 0 < found.delivered_percent <= 100
@@ -52,7 +56,7 @@ def test_a_cell_of_the_latency(source: Camera, robot: product.Robot, ours: bool)
 @pytest.mark.timed  # webrtcbin connects within 15 s, but not beside three others.
 @pytest.mark.parametrize("name", peers.PEERS)
 def test_a_round_of_a_peer(source: Camera, robot: product.Robot, name: str) -> None:
-    found = peers.one_round(name, source, robot, settle_s=0.5, watch_s=1.0)
+    found = peers.one_round(name, source, robot, settle_s=0.5, watch_s=WATCH_S)
     assert 0 < found.median_ms <= found.p99_ms
     assert 0 < found.delivered_percent <= 100
 
@@ -86,15 +90,30 @@ def test_a_round_of_cameras(source: Camera, tmp_path: Path) -> None:
 
 def test_a_round_of_viewers_that_join_at_once(source: Camera, tmp_path: Path) -> None:
     with product.robot(tmp_path, source, latency.LATENCY_MS, settings=joining_together.SETTINGS) as robot:
-        found = joining_together.one_round(robot, viewers=3)
-    assert found.slowest_ms > 0
-    assert 1 <= found.key_frames <= 3
+
+        def attempt() -> None:
+            # Viewers that stand still with the machine come too late to share a key frame.
+            with no_stall():
+                found = joined(robot)
+                assert found.slowest_ms > 0
+                assert 1 <= found.key_frames <= 3
+
+        undisturbed(attempt)
+
+
+def joined(robot: product.Robot) -> joining_together.Joined:
+    """A round of three viewers; one that measures nothing fails the test."""
+    try:
+        return joining_together.one_round(robot, viewers=3)
+    except RuntimeError as error:
+        raise AssertionError(str(error)) from error
 
 
 def test_a_watch_over_a_narrow_link(source: Camera, tmp_path: Path) -> None:
     narrow = Impairment(delay_s=0.01, rate_kbps=1500, queue_s=2.0)
     with product.robot(tmp_path, source, latency.LATENCY_MS, far=True) as robot:
-        found = watch_far(source, robot, narrow, settle_s=0.0, watch_s=2.0)
+        # The viewer's program may take seconds to start, and one that has seen nothing has no figures.
+        found = watch_far(source, robot, narrow, settle_s=4.0, watch_s=2.0)
     # A frame is no younger than the link is long, and a picture is on the screen until the next one comes.
     assert found.glass().worst_ms >= found.glass().p95_ms > 10
     assert found.glass().worst_ms > max(one.latency_ms for one in found.window.glances)
