@@ -191,12 +191,12 @@ async def available(robot: DrivenRobot) -> AsyncIterator[AsyncGatewayClient]:
     async with AsyncGatewayClient(robot.target) as client:
 
         async def free() -> bool:
-            teleop = (await client.status()).teleop
-            if teleop.stop:
-                try:
+            try:
+                teleop = (await client.status()).teleop
+                if teleop.stop:
                     await client.reset_stop(teleop.stop.stop_id)
-                except GatewayError:
-                    return False
+            except GatewayError:
+                return False
             # The drive program's word: the gateway knows of the end of a session before it does.
             return teleop.phase is DrivePhase.AVAILABLE and not teleop.holder and not teleop.stop
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.video.foreign import end
-from console.client import Credentials, GatewayClient, PreviewState, Unreachable
+from console.client import Credentials, DeadlineExceeded, GatewayClient, PreviewState, Unreachable
 from console.robots import read_credentials, read_robots_file
 from console.robots.login import parse_login
 from gateway.access.credential import Kind
@@ -19,8 +19,10 @@ from gateway.access.directory import CredentialDirectory
 from gateway.access.role import Role
 from tests.support.free import free_tcp_port
 from tests.support.guarded_gateway import HOSTS
+from tests.support.patient import PATIENT
 from tests.support.robotctl import robotctl, robotctl_process
 from tests.support.running_preview import RunningPreview
+from tests.support.video_ground import switch_on
 from tests.support.waiting import wait_until
 
 _ROOT = Path(__file__).parents[2]
@@ -80,7 +82,7 @@ class Guarded:
 
     def client(self) -> GatewayClient:
         """The test's own connection."""
-        return GatewayClient(self.target, credentials=self.own)
+        return GatewayClient(self.target, PATIENT, self.own)
 
     def log(self) -> str:
         """What the gateway has written so far."""
@@ -89,8 +91,7 @@ class Guarded:
     def switch_on(self) -> None:
         """Frames leave when this returns."""
         with self.client() as client:
-            change = client.enable_preview()
-        assert change.preview.state is PreviewState.RUNNING, change
+            switch_on(client)
 
     def switch_off(self) -> None:
         """The preview is off when this returns."""
@@ -99,7 +100,10 @@ class Guarded:
 
     def answers(self) -> bool:
         """Whether the gateway is up."""
-        with suppress(Unreachable), self.client() as client:
+        with (
+            suppress(Unreachable, DeadlineExceeded),
+            GatewayClient(self.target, credentials=self.own) as client,
+        ):
             client.status()
             return True
         return False

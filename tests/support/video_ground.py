@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from console.client import GatewayClient, PreviewProfile, PreviewState
+from console.client import DeadlineExceeded, GatewayClient, PreviewProfile, PreviewState, Unreachable
 from tests.support.free import free_tcp_port
+from tests.support.patient import PATIENT
 from tests.support.running_preview import RunningPreview
 from tests.support.waiting import wait_until
 
@@ -64,13 +65,12 @@ class VideoGround:
 
     def switch_on(self, profile: PreviewProfile = PreviewProfile.BALANCED) -> None:
         """Frames leave when this returns."""
-        with GatewayClient(self.target) as client:
-            change = client.enable_preview(profile)
-        assert change.preview.state is PreviewState.RUNNING, change
+        with GatewayClient(self.target, PATIENT) as client:
+            switch_on(client, profile)
 
     def switch_off(self) -> None:
         """The preview is off when this returns."""
-        with GatewayClient(self.target) as client:
+        with GatewayClient(self.target, PATIENT) as client:
             assert client.disable_preview().preview.state is PreviewState.DISABLED
 
     def kill_preview(self) -> None:
@@ -79,11 +79,28 @@ class VideoGround:
         self.preview.process.wait()
 
     def _knows_the_preview(self) -> bool:
-        with socket.socket() as probe, suppress(ConnectionRefusedError):
+        # It may be up and not answer yet: its machine may stand still.
+        with socket.socket() as probe, suppress(ConnectionRefusedError, Unreachable, DeadlineExceeded):
             probe.connect(("127.0.0.1", self.port))
             with GatewayClient(self.target) as client:
                 return client.status().preview.service_reachable
         return False
+
+
+def switch_on(client: GatewayClient, profile: PreviewProfile = PreviewProfile.UNKNOWN) -> None:
+    """Turns the preview on; frames leave when this returns.
+
+    On a machine that stands still a start may come too late, and is FAULTED until the next one.
+    """
+    change = client.enable_preview(profile)
+    assert change.accepted, change
+
+    def leave() -> bool:
+        preview = client.status().preview
+        as_asked = profile in (PreviewProfile.UNKNOWN, preview.profile)
+        return preview.state is PreviewState.RUNNING and as_asked
+
+    wait_until(leave, "frames leave", _UP_WITHIN_S)
 
 
 @contextmanager
