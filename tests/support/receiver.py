@@ -1,7 +1,8 @@
 """The receiver on its own: one connection, without the session that redials and keeps the latest frame."""
 
 import time
-from typing import Self
+from contextlib import suppress
+from typing import Final, Self
 
 from console.receiver.address import StreamAddress
 from console.receiver.connection import connect
@@ -10,6 +11,10 @@ from console.receiver.errors import StreamError, no_frame_within
 from console.receiver.frame import Frame
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.options import ReceiverOptions
+from tests.support.streams import SrtSender
+
+_SHOWN_WITHIN_S: Final = 20.0
+_SILENCE_S: Final = 1.0
 
 
 class NoFrameError(StreamError):
@@ -59,3 +64,26 @@ class Receiver:
             silence = no_frame_within(self._address, timeout_s)
             raise NoFrameError(silence.what, silence.remedy)
         raise taken.with_traceback(None)
+
+
+def show_the_first(piece: bytes, sender: SrtSender, viewer: Receiver) -> Frame:
+    """Sends a key frame until it comes: a connection that is being made gets nothing of what is sent."""
+    deadline_s = time.monotonic() + _SHOWN_WITHIN_S
+    assert sender.viewer_joined.wait(_SHOWN_WITHIN_S), "the viewer did not get through"
+    sender.viewer_joined.clear()
+    sent = 0
+    while True:
+        sender.send(piece)
+        sent += 1
+        try:
+            frame = viewer.next_frame(_SILENCE_S)
+        except NoFrameError:
+            assert time.monotonic() < deadline_s, "no frame comes"
+        else:
+            break
+    if sent > 1:
+        # More than one may be on its way: what is sent afterwards comes after all of them.
+        with suppress(NoFrameError):
+            while True:
+                viewer.next_frame(_SILENCE_S)
+    return frame

@@ -21,6 +21,7 @@ _MAX_WAITING: Final = 4096
 _MAX_CALLERS: Final = 64
 _KEPT: Final = 64
 _LONGEST_PACKET: Final = 2048
+_BUFFER_BYTES: Final = 1 << 22
 _CONTROL: Final = 0x80
 """First bit of an SRT packet: set in control packets (draft-sharabayko-srt 3)."""
 
@@ -221,5 +222,7 @@ def next_arrival_in_s(*lines: Line[ItemT]) -> float | None:
 
 def _socket(at: tuple[str, int] = ("127.0.0.1", 0)) -> socket.socket:
     made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    # As long as the kernel permits: the link itself loses nothing while its thread stands still.
+    made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER_BYTES)
     made.bind(at)
     return made

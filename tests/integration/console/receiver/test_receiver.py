@@ -15,7 +15,7 @@ from console.receiver.errors import (
 )
 from console.receiver.options import ReceiverOptions
 from tests.support.free import free_udp_port
-from tests.support.receiver import NoFrameError, Receiver
+from tests.support.receiver import NoFrameError, Receiver, show_the_first
 from tests.support.streams import SrtSender, encode
 from tests.support.waiting import wait_until
 
@@ -52,12 +52,13 @@ def joined(sender: SrtSender) -> None:
 def test_a_frame_does_not_wait_for_the_next_one(sender: SrtSender, port: int, codec: str) -> None:
     pieces = encode(codec, 12)
     with viewer(port) as receiver:
-        joined(sender)
-        for piece in pieces:
+        frames = [show_the_first(pieces[0], sender, receiver)]
+        for piece in pieces[1:]:
             sender.send(piece)
-            frame = receiver.next_frame(PATIENCE_S)
-            assert (frame.width, frame.height, frame.codec) == (320, 240, codec)
-            assert not frame.corrupt
+            frames.append(receiver.next_frame(PATIENCE_S))
+    for frame in frames:
+        assert (frame.width, frame.height, frame.codec) == (320, 240, codec)
+        assert not frame.corrupt
 
 
 def test_frames_differ_and_times_grow(sender: SrtSender, port: int) -> None:
@@ -76,9 +77,7 @@ def test_frames_differ_and_times_grow(sender: SrtSender, port: int) -> None:
 def test_a_slow_caller_gets_the_newest_frames(sender: SrtSender, port: int) -> None:
     pieces = encode("h264", 10)
     with viewer(port, queue_size=1) as receiver:
-        joined(sender)
-        sender.send(pieces[0])
-        first = receiver.next_frame(PATIENCE_S)
+        first = show_the_first(pieces[0], sender, receiver)
         for piece in pieces[1:]:
             sender.send(piece)
         newest = receiver.next_frame(PATIENCE_S)
@@ -100,8 +99,8 @@ def test_the_codec_may_change_under_the_connection(sender: SrtSender, port: int)
 def test_the_end_is_reported(port: int) -> None:
     pieces = encode("h264", 3)
     with SrtSender(port) as sender, viewer(port, queue_size=3) as receiver:
-        joined(sender)
-        for piece in pieces:
+        show_the_first(pieces[0], sender, receiver)
+        for piece in pieces[1:]:
             sender.send(piece)
             receiver.next_frame(PATIENCE_S)
         sender.close()
@@ -140,17 +139,13 @@ def test_the_passphrase_fits(port: int) -> None:
     piece = encode("h264", 1)[0]
     address = StreamAddress("127.0.0.1", port, latency_ms=20, passphrase="the right one")
     with SrtSender(port, passphrase="the right one") as sender, Receiver(address) as receiver:
-        joined(sender)
-        sender.send(piece)
-        assert receiver.next_frame(PATIENCE_S).width == 320
+        assert show_the_first(piece, sender, receiver).width == 320
 
 
 def test_a_name_is_called_where_the_robot_listens(sender: SrtSender, port: int) -> None:
     """The name localhost is an IPv6 address, too, without a listener."""
     with Receiver(StreamAddress("localhost", port, latency_ms=20)) as receiver:
-        joined(sender)
-        sender.send(encode("h264", 1)[0])
-        assert receiver.next_frame(PATIENCE_S).width == 320
+        assert show_the_first(encode("h264", 1)[0], sender, receiver).width == 320
 
 
 def test_an_unknown_host_is_reported(port: int) -> None:
