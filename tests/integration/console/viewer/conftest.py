@@ -10,7 +10,14 @@ import pytest
 
 from console.viewer.robot_video import RobotVideo
 from console.viewer.session import VideoSession
+from tests.support.patient import be_patient
 from tests.support.video_ground import VideoGround, video_ground
+
+
+@pytest.fixture(autouse=True)
+def patient(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Calls of a viewer's worker that a stall does not end."""
+    be_patient(request, monkeypatch)
 
 
 @pytest.fixture
@@ -30,8 +37,9 @@ def following(target: str, **options: Any) -> Iterator[VideoSession]:
     try:
         yield robot.session
     finally:
-        assert robot.worker.close()
-        assert robot.session.close()
+        # How soon they close has tests of its own.
+        assert robot.worker.close(10)
+        assert robot.session.close(10)
 
 
 @pytest.fixture
