@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.documented_commands import PAGES, ROOT, Block, blocks
-from tests.support.free import free_tcp_port, port_is_free
+from tests.support.free import free_tcp_port
 from tests.support.robotctl import environment
 from tests.support.video_ground import VideoGround, video_ground
 from tests.support.waiting import wait_until
@@ -96,10 +96,16 @@ def test_the_way_to_a_guarded_gateway(tmp_path: Path) -> None:
     serve: list[str | Path] = [BIN / "robot-gateway", "serve", "--config", str(config)]
     with subprocess.Popen(serve, stderr=subprocess.DEVNULL) as gateway:
         try:
-            wait_until(lambda: not port_is_free(socket.SOCK_STREAM, port), "the gateway listens", 30)
+            wait_until(lambda: listens(port), "the gateway listens", 30)
             reader.types(login)
         finally:
             gateway.terminate()
+
+
+def listens(port: int) -> bool:
+    """Whether a program does; without a bind, which would keep it out at that moment."""
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
 
 
 def test_every_block_is_run_or_says_why_not() -> None:

@@ -59,8 +59,8 @@ def test_the_keys_switch_the_preview_of_a_real_gateway(tmp_path: Path) -> None:
         screen.wait_to_see("p preview on")
         screen.press("p")
         screen.wait_to_see("p preview off")
-        assert gateway.status().preview.state == states.PREVIEW_RUNNING
         screen.wait_to_see("RUNNING")
+        assert gateway.status().preview.state == states.PREVIEW_RUNNING
         for key, words, profile in (
             ("1", "[low-bw]", preview_pb2.PREVIEW_PROFILE_LOW_BW),
             ("3", "[high-quality]", preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY),
