@@ -15,7 +15,14 @@ from omniseer.gateway.v1 import preview_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.bad_links import black_hole
 from tests.support.gateway_double import GatewayDouble, serving
-from tests.support.robotctl import ENDS_WITHIN_S, ROBOTCTL, environment, only_line, robotctl
+from tests.support.robotctl import (
+    ENDS_WITHIN_S,
+    ROBOTCTL,
+    environment,
+    only_line,
+    robotctl,
+    robotctl_in_time,
+)
 
 KNOWN_WITHIN_S = 3.0
 START_OF_PYTHON_S = 3.0
@@ -182,7 +189,7 @@ def test_an_output_that_takes_nothing_is_one_line(target: str) -> None:
 
 def unreachable(words: tuple[str, ...]) -> str:
     began_s = time.monotonic()
-    ended = robotctl(*words)
+    ended = robotctl_in_time(*words)
     assert time.monotonic() - began_s < KNOWN_WITHIN_S + START_OF_PYTHON_S
     assert (ended.returncode, ended.stdout) == (3, "")
     return only_line(ended.stderr)
