@@ -14,6 +14,7 @@ from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from unittest import mock
 
+from common.errors import ExitCode
 from console.cli.run import exit_code
 from console.client import ClientOptions, aio
 from tests.support.patient import PATIENT
@@ -80,6 +81,16 @@ def robotctl_process(*words: str, **extra: str) -> "subprocess.CompletedProcess[
         env=environment(**extra),
         check=False,
     )
+
+
+def viewed(*words: str, **extra: str) -> "subprocess.CompletedProcess[str]":
+    """`robotctl_process` of a robot that is there and may be viewed: the first call may find it too late.
+
+    A viewer without a window ends when its first connection is not made in time, as on a machine that has
+    stood still: then it is started once more.
+    """
+    done = robotctl_process(*words, **extra)
+    return robotctl_process(*words, **extra) if done.returncode == ExitCode.UNREACHABLE else done
 
 
 def only_line(text: str) -> str:

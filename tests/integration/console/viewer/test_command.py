@@ -10,10 +10,19 @@ from pathlib import Path
 
 import pytest
 
+from console.client import GatewayClient
 from tests.support.free import free_tcp_port
 from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.judges import decoded_frames
-from tests.support.robotctl import ENDS_WITHIN_S, ROBOTCTL, environment, only_line, robotctl_process
+from tests.support.patient import PATIENT
+from tests.support.robotctl import (
+    ENDS_WITHIN_S,
+    ROBOTCTL,
+    environment,
+    only_line,
+    robotctl_process,
+    viewed,
+)
 from tests.support.robotctl_docs import documented, holds
 from tests.support.video_ground import VideoGround, video_ground
 from tests.support.waiting import wait_until
@@ -45,7 +54,7 @@ def without(library: str, directory: Path) -> str:
 
 
 def test_frames_are_counted_in_one_line(running: VideoGround) -> None:
-    done = robotctl_process("--target", running.target, "view", "--headless", "--frames", "20")
+    done = viewed("--target", running.target, "view", "--headless", "--frames", "20")
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     said = only_line(done.stdout)
@@ -56,7 +65,7 @@ def test_frames_are_counted_in_one_line(running: VideoGround) -> None:
 def test_the_json_has_exactly_the_documented_keys(running: VideoGround, tmp_path: Path) -> None:
     file = tmp_path / "kept.ts"
     command = ["view", "--headless", "--frames", "20", "--record", str(file)]
-    done = robotctl_process("--target", running.target, "--json", *command)
+    done = viewed("--target", running.target, "--json", *command)
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
     holds(documented("view --json"), document, complete=True)
@@ -72,7 +81,7 @@ def test_a_stream_on_the_network_is_encrypted_and_opens_without_a_login(tmp_path
         status = json.loads(robotctl_process("--target", ground.target, "--json", "status").stdout)
         assert status["preview"]["endpoint"]["encrypted"]
         assert "passphrase" not in status["preview"]["endpoint"]
-        done = robotctl_process("--target", ground.target, "view", "--headless", "--frames", "20")
+        done = viewed("--target", ground.target, "view", "--headless", "--frames", "20")
         assert (done.returncode, done.stderr) == (0, "")
 
 
@@ -118,7 +127,7 @@ def test_the_window_shows_and_closes(running: VideoGround, tmp_path: Path) -> No
 
 
 def test_a_full_disk_is_one_line(running: VideoGround) -> None:
-    done = robotctl_process(
+    done = viewed(
         "--target", running.target, "view", "--headless", "--frames", "500", "--record", "/dev/full"
     )
     assert done.returncode == 1
@@ -175,7 +184,7 @@ def test_a_login_that_can_not_be_used_is_one_line_and_2_and_leaves_no_file(
 
 def test_a_preview_that_is_off_is_one_line_and_1() -> None:
     with serving(GatewayDouble()) as port:
-        done = robotctl_process("--target", f"127.0.0.1:{port}", "view", "--headless", "--frames", "3")
+        done = viewed("--target", f"127.0.0.1:{port}", "view", "--headless", "--frames", "3")
     assert done.returncode == 1
     expected = f"error: the preview is off. Type: robotctl --target 127.0.0.1:{port} preview on"
     assert only_line(done.stderr) == expected
@@ -189,23 +198,25 @@ def claiming_to_run(words: str = "") -> Iterator[str]:
     double.fault = words
     with serving(double) as port:
         target = f"127.0.0.1:{port}"
-        robotctl_process("--target", target, "preview", "on")
+        with GatewayClient(target, PATIENT) as client:
+            assert client.enable_preview().accepted
         double.status.preview.endpoint.port = free_tcp_port()
         yield target
 
 
 def test_a_stream_that_does_not_come_is_one_line_and_3() -> None:
+    """SRT gives up after 3 s, and a machine that stands still needs time beyond that."""
     with claiming_to_run() as target:
-        done = robotctl_process("--target", target, "view", "--headless", "--frames", "3", "--patience", "4")
+        done = robotctl_process("--target", target, "view", "--headless", "--frames", "3", "--patience", "8")
     assert done.returncode == 3
     said = only_line(done.stderr)
-    assert "no frame for 4 s: the preview is running; no SRT listener answers" in said
+    assert "no frame for 8 s: the preview is running; no SRT listener answers" in said
     assert said.endswith(f"Look at: robotctl --target {target} doctor")
 
 
 def test_a_faulted_preview_is_one_line_and_1() -> None:
     with claiming_to_run("the camera is gone. Plug it in") as target:
-        done = robotctl_process("--target", target, "view", "--headless", "--frames", "3", "--patience", "1")
+        done = viewed("--target", target, "view", "--headless", "--frames", "3", "--patience", "5")
     assert done.returncode == 1
     assert "the preview is faulted: the camera is gone. Plug it in" in only_line(done.stderr)
 
@@ -233,7 +244,7 @@ def test_without_qt_one_line_says_what_to_install(running: VideoGround, tmp_path
     assert said.startswith("error: the window needs Qt")
     assert said.endswith("scripts/install-console")
     command = ["view", "--headless", "--frames", "3"]
-    assert robotctl_process("--target", running.target, *command, PYTHONPATH=path).returncode == 0
+    assert viewed("--target", running.target, *command, PYTHONPATH=path).returncode == 0
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,8 @@ from console.receiver import clips
 from console.receiver.decoder_probe import objection
 from tests.support.clips import FRAMES
 from tests.support.processes import has_ended
-from tests.support.robotctl import robotctl_process
+from tests.support.promise import MS, keeps
+from tests.support.robotctl import viewed
 from tests.support.video_ground import VideoGround, video_ground
 from tests.support.waiting import wait_until
 
@@ -42,7 +43,7 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[VideoGround]:
 
 def seen(ground: VideoGround, **faults: str) -> dict[str, Any]:
     """What a viewer with these decoders saw."""
-    done = robotctl_process(
+    done = viewed(
         *("--target", ground.target, "--json", "view", "--headless", "--frames", "10"),
         **with_doubles(**faults),
     )
@@ -90,7 +91,8 @@ def test_a_trial_finds_what_is_wrong(fault: str, why: str) -> None:
 
 
 TRIAL = "console.receiver.decoder_trial"
-ENDS_WITHIN_S = 2.0
+TRIED_WITHIN_S = 60.0
+FIRST_PICTURE_MS = 6000
 
 
 @contextmanager
@@ -111,7 +113,7 @@ def test_a_trial_that_hangs_in_its_driver_ends_with_its_parent() -> None:
             lambda: any("libgstreamer" in each.path for each in trial.memory_maps()), "GStreamer is loaded"
         )
         parent.kill()
-        wait_until(lambda: has_ended(trial.pid), "it ends", ENDS_WITHIN_S)
+        wait_until(lambda: has_ended(trial.pid), "it ends")
 
 
 def test_a_trial_that_hangs_before_it_has_loaded_gstreamer_ends_with_its_parent(tmp_path: Path) -> None:
@@ -126,7 +128,7 @@ def test_a_trial_that_hangs_before_it_has_loaded_gstreamer_ends_with_its_parent(
     with trial_in_progress(PYTHONPATH=str(tmp_path)) as (parent, trial):
         wait_until(begun.exists, "it loads GStreamer")
         parent.kill()
-        wait_until(lambda: has_ended(trial.pid), "it ends", ENDS_WITHIN_S)
+        wait_until(lambda: has_ended(trial.pid), "it ends")
 
 
 def test_a_trial_whose_parent_is_gone_already_does_not_begin() -> None:
@@ -142,11 +144,13 @@ def test_a_trial_whose_parent_is_gone_already_does_not_begin() -> None:
 
 
 def test_a_proven_decoder_is_used(running: VideoGround) -> None:
-    assert seen(running, vah264dec="ok")["decoder"] == "vah264dec"
+    # A viewer whose trials take longer than 3 s, as on a machine that stands still, begins in software.
+    wait_until(lambda: seen(running, vah264dec="ok")["decoder"] == "vah264dec", "it is used", TRIED_WITHIN_S)
 
 
 def test_the_first_that_proves_itself_is_used(running: VideoGround) -> None:
-    assert seen(running, vah264dec="wrong", nvh264dec="ok")["decoder"] == "nvh264dec"
+    faults = {"vah264dec": "wrong", "nvh264dec": "ok"}
+    wait_until(lambda: seen(running, **faults)["decoder"] == "nvh264dec", "it is used", TRIED_WITHIN_S)
 
 
 def test_where_none_proves_itself_software_decodes(running: VideoGround) -> None:
@@ -162,7 +166,11 @@ def test_one_that_fails_with_the_real_stream_is_replaced_by_software(
     assert document["redials"] >= 1
 
 
+@pytest.mark.timed
 def test_a_decoder_that_hangs_in_its_trial_does_not_delay_the_video(running: VideoGround) -> None:
-    document = seen(running, vah264dec="stuck")
-    assert document["decoder"] == "avdec_h264"
-    assert document["first_picture_ms"] < 6000
+    def first_picture_ms() -> float:
+        document = seen(running, vah264dec="stuck")
+        assert document["decoder"] == "avdec_h264"
+        return float(document["first_picture_ms"])
+
+    keeps(FIRST_PICTURE_MS, "ms until the first picture", first_picture_ms, per_stalled_s=MS)
