@@ -12,7 +12,7 @@ import pytest
 # Read when the first application is made.
 os.environ.setdefault("QT_QPA_PLATFORM", f"offscreen:configfile={Path(__file__).with_name('offscreen.json')}")
 
-from PySide6.QtCore import QEventLoop, QSettings, Qt, QTimer
+from PySide6.QtCore import QCoreApplication, QEventLoop, QSettings, Qt, QTimer
 from PySide6.QtGui import QColor, QImage, QPalette
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
@@ -24,6 +24,8 @@ _FOR_THE_DOCUMENTS: Final = "SCREENSHOTS_FOR_DOCUMENTS"
 """Environment variable: set where screenshots for docs/images are taken."""
 _LAID_OUT_AFTER_S = 0.3
 """Texts that have just changed have found their place."""
+_TURNS: Final = 5
+"""Of the event loop: one event has another one sent."""
 LIGHT, DARK = QColor("#efefef"), QColor("#2d2d30")
 
 
@@ -55,6 +57,9 @@ def let_pass(seconds: float) -> None:
     loop = QEventLoop()
     QTimer.singleShot(round(seconds * 1000), loop.quit)
     loop.exec()
+    # After a stall the time is over before what has come meanwhile was looked at.
+    for _ in range(_TURNS):
+        QCoreApplication.processEvents()
 
 
 def until(condition: Callable[[], T | None], what: str, within_s: float = 20.0) -> T:

@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import pytest
 from zeroconf import ServiceInfo, Zeroconf
@@ -66,17 +67,31 @@ def test_a_gateway_is_found_from_its_start_to_its_end(tmp_path: Path) -> None:
             assert (robot.name, robot.tls, robot.contract) == ("lab 1 ü", False, "omniseer.gateway.v1")
             known = robotctl_process("robots", "add", "lab1", target, XDG_CONFIG_HOME=str(tmp_path))
             assert known.returncode == 0
-            document = json.loads(
-                robotctl("robots", "discover", "--json", XDG_CONFIG_HOME=str(tmp_path)).stdout
-            )
+
+            # A search of robotctl lasts a moment, in which an answer may be late.
+            def listed() -> dict[str, Any] | None:
+                ended = robotctl("robots", "discover", "--json", XDG_CONFIG_HOME=str(tmp_path))
+                document: dict[str, Any] = json.loads(ended.stdout)
+                return document if target in {each["target"] for each in document["robots"]} else None
+
+            document = wait_until(listed, "a search finds it", ANNOUNCED_WITHIN_S)
             holds(documented("robots discover --json"), document, complete=True)
             (found,) = [each for each in document["robots"] if each["target"] == target]
             assert found["known_as"] == "lab1"
-            shown = robotctl("robots", "discover").stdout
-            assert f"robotctl robots add lab-1 {target}" in shown
-            nowhere = robotctl("doctor", "--target", f"{LOOPBACK}:{free_tcp_port()}")
-            assert nowhere.returncode == 3
-            assert f"lab 1 ü at {target}" in nowhere.stdout
+            wait_until(
+                lambda: f"robotctl robots add lab-1 {target}" in robotctl("robots", "discover").stdout,
+                "how it becomes known",
+                ANNOUNCED_WITHIN_S,
+            )
+
+            def doctor_of_nowhere() -> str:
+                nowhere = robotctl("doctor", "--target", f"{LOOPBACK}:{free_tcp_port()}")
+                assert nowhere.returncode == 3
+                return nowhere.stdout
+
+            wait_until(
+                lambda: f"lab 1 ü at {target}" in doctor_of_nowhere(), "the doctor's", ANNOUNCED_WITHIN_S
+            )
         wait_until(lambda: target not in targets(discovery), "it has said goodbye", ANNOUNCED_WITHIN_S)
 
 

@@ -121,7 +121,7 @@ def test_a_fault_is_shown_with_what_to_do(desk_work: Desk) -> None:
     desk_work.gateway.works = False
     desk_work.click(desk_work.preview.switch)
     desk_work.state_is("FAULTED")
-    assert desk_work.notes() == ["no encoder works. Type: robot-preview encoders"]
+    until(lambda: desk_work.notes() == ["no encoder works. Type: robot-preview encoders"], "what to do")
 
 
 def test_while_the_robot_thinks_nothing_can_be_pressed_and_the_focus_comes_back(desk_work: Desk) -> None:

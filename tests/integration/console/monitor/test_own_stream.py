@@ -33,7 +33,7 @@ def test_the_age_is_plotted_and_delivery_and_link_are_this_windows_own(ground: V
         assert window.plots.all[0].accessibleName().startswith("Picture age: ")
         until(lambda: "direct, round trip" in stream_row(window), "the delivery")
         until(lambda: "of the video here" in window.header.link.toolTip(), "the loss of this stream")
-        assert "direct, round trip" in window.header.picture.toolTip()
+        until(lambda: "direct, round trip" in window.header.picture.toolTip(), "the delivery beside the age")
 
 
 def test_a_fallback_to_the_srt_latency_is_a_warning_with_its_reason(
