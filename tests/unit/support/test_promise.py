@@ -146,6 +146,28 @@ async def test_a_stall_that_is_too_short_for_what_is_late_is_no_excuse(
         await keeps_async(2.0, "it", measure, per_stalled_s=per_stalled_s)
 
 
+async def test_what_fails_within_a_measurement_is_begun_anew_after_a_stall_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stalls, failures = PlayedStalls(SPOILT_FROM_S), iter([True, False, True, False, True])
+    monkeypatch.setattr("tests.support.undisturbed.Stalls", lambda: stalls)
+
+    def measure() -> float:
+        assert not next(failures)
+        return 1.5
+
+    async def measure_in_a_loop() -> float:
+        return measure()
+
+    with pytest.warns(UserWarning, match="begun anew: the machine stood still"):
+        assert keeps(2.0, "s", measure) == 1.5
+    with pytest.warns(UserWarning, match="begun anew: the machine stood still"):
+        assert await keeps_async(2.0, "s", measure_in_a_loop) == 1.5
+    stalls.longest_s = SPOILT_FROM_S - 0.001
+    with pytest.raises(AssertionError):
+        keeps(2.0, "s", measure)
+
+
 def test_a_process_that_stands_still_is_noticed() -> None:
     with Stalls() as stalls:
         ctypes.PyDLL(None).usleep(150_000)  # of a library for Python's own functions: no other thread runs
