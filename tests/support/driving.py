@@ -10,7 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -25,7 +25,7 @@ from tests.support.drive_peer import Instants
 from tests.support.explained import explained_by
 from tests.support.ros import SimulatedRobot, simulated_robot
 from tests.support.running_drive import worker_of
-from tests.support.undisturbed import WORKER_LOST, DisturbedError, same_worker
+from tests.support.undisturbed import WORKER_LOST, DisturbedError, no_stall, same_worker
 from tests.support.waiting import wait_until
 
 _ROOT: Final = Path(__file__).parents[2]
@@ -332,9 +332,10 @@ class Driving:
             loses_worker: the block itself ends the worker.
 
         Raises:
-            DisturbedError: the robot is at rest already, or the worker was lost without need.
+            DisturbedError: the robot is at rest already, the worker was lost without need, or something has
+                failed in a stall.
         """
-        with nullcontext() if loses_worker else self.same_worker():
+        with no_stall() if loses_worker else self.same_worker():
             if not self.witness.moves():
                 raise DisturbedError("the robot was at rest already")
             yield
@@ -344,10 +345,11 @@ class Driving:
         """A part of an attempt, after `ready`; see tests.support.undisturbed.
 
         Raises:
-            DisturbedError: the worker was lost.
+            DisturbedError: the worker was lost, or something has failed in a stall: a driver who is late then
+                has to hold anew.
         """
         try:
-            with same_worker(self) as self.observer.worker:
+            with same_worker(self) as self.observer.worker, no_stall():
                 yield
         finally:
             self.observer.worker = None
