@@ -6,10 +6,11 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 import grpc
 import yaml
@@ -29,6 +30,12 @@ PROFILES = {
     "balanced": SMALL | {"fps": 30, "bitrate_kbps": 600, "floor_kbps": 150},
     "high_quality": SMALL | {"fps": 60, "bitrate_kbps": 900, "floor_kbps": 200},
 }
+
+
+class NextState(Protocol):
+    """See `RunningPreview.watching`."""
+
+    def __call__(self, holds: Callable[[pb.ActualState], object], what: str) -> pb.ActualState: ...
 
 
 class RunningPreview:
@@ -151,21 +158,37 @@ class RunningPreview:
         self, holds: Callable[[pb.ActualState], object], what: str, within_s: float = PATIENCE_S
     ) -> pb.ActualState:
         """Watches the service until a condition of its state holds."""
+        with self.watching(within_s) as next_state:
+            return next_state(holds, what)
+
+    @contextmanager
+    def watching(self, within_s: float = PATIENCE_S) -> Iterator[NextState]:
+        """Watches the service while the block lasts, so that no state between two conditions is missed.
+
+        Yields:
+            Waits for a condition among the states since the last one.
+        """
         deadline = time.monotonic() + within_s
         last: pb.ActualState | None = None
         call = self.stub.WatchActualState(pb.WatchActualStateRequest(), timeout=within_s, wait_for_ready=True)
+
+        def next_state(holds: Callable[[pb.ActualState], object], what: str) -> pb.ActualState:
+            nonlocal last
+            try:
+                for answer in call:
+                    last = answer.actual
+                    if holds(last):
+                        return last
+                    if time.monotonic() > deadline:
+                        break
+            except grpc.RpcError as error:
+                raise AssertionError(f"{what}: {error}; last: {last}") from error
+            raise AssertionError(f"not within {within_s:g} s: {what}; last: {last}")
+
         try:
-            for answer in call:
-                last = answer.actual
-                if holds(last):
-                    return last
-                if time.monotonic() > deadline:
-                    break
-        except grpc.RpcError as error:
-            raise AssertionError(f"{what}: {error}; last: {last}") from error
+            yield next_state
         finally:
             call.cancel()
-        raise AssertionError(f"not within {within_s:g} s: {what}; last: {last}")
 
     def running(self, *, revision: int | None = None, within_s: float = PATIENCE_S) -> pb.ActualState:
         """Waits until frames flow."""

@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Final, NoReturn, Protocol, TypeVar
 
 import psutil
@@ -92,6 +93,16 @@ def undisturbed(attempt: Callable[[], T]) -> T:
         except DisturbedError as error:
             _begin_anew(error)
     return _give_up()
+
+
+def without_stall(attempt: Callable[[Path], T], directory: Path) -> T:
+    """Begins anew while a stall explains what fails; each attempt gets a directory of its own in this one."""
+
+    def once() -> T:
+        with no_stall():
+            return attempt(Path(mkdtemp(dir=directory)))
+
+    return undisturbed(once)
 
 
 async def undisturbed_async(attempt: Callable[[], Awaitable[T]]) -> T:

@@ -9,6 +9,7 @@ from tests.support.mpegts import analyse
 from tests.support.recording import record
 from tests.support.running_preview import RunningPreview
 from tests.support.udp_link import Impairment, UdpLink
+from tests.support.undisturbed import without_stall
 from tests.support.watcher import Watcher
 
 pytestmark = pytest.mark.gst
@@ -21,9 +22,15 @@ LATENCY_MS = 500
 """Of the service, for losses that a viewer with 20 ms of its own could not make up for on this link."""
 
 
+@pytest.mark.timeout(300)
 def test_what_is_lost_is_sent_again_although_control_packets_are_lost(tmp_path: Path) -> None:
+    # What a stall makes later than the latency is lost for good, as it is to be.
+    without_stall(what_is_lost_is_sent_again, tmp_path)
+
+
+def what_is_lost_is_sent_again(directory: Path) -> None:
     with (
-        RunningPreview(tmp_path, {"srt": {"latency_ms": LATENCY_MS}}) as preview,
+        RunningPreview(directory, {"srt": {"latency_ms": LATENCY_MS}}) as preview,
         UdpLink(preview.port, Impairment(delay_s=DELAY_S)) as link,
         ThreadPoolExecutor(1) as viewer,
     ):

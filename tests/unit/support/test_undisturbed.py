@@ -19,6 +19,7 @@ from tests.support.undisturbed import (
     same_worker,
     undisturbed,
     undisturbed_async,
+    without_stall,
 )
 
 SILENT = "no heartbeat of the worker for 61 ms, it waits for a processor: it is killed (exit code -9)"
@@ -126,6 +127,21 @@ def test_what_fails_in_a_stall_is_begun_anew(stalls: SimpleNamespace) -> None:
         raise AssertionError
     with no_stall():
         pass
+
+
+def test_each_attempt_has_a_directory_of_its_own(stalls: SimpleNamespace, tmp_path: Path) -> None:
+    directories = []
+
+    def attempt(directory: Path) -> Path:
+        directories.append(directory)
+        assert len(directories) > 1
+        return directory
+
+    stalls.longest_s = SPOILT_FROM_S
+    with pytest.warns(UserWarning, match="stood still"):
+        assert without_stall(attempt, tmp_path) == directories[1]
+    assert {*directories} == {*tmp_path.iterdir()}
+    assert len(directories) == 2
 
 
 def test_what_fails_without_a_stall_has_failed(stalls: SimpleNamespace) -> None:
