@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from tests.support.film import clip
 from tests.support.promise import keeps
 from tests.support.running_preview import RunningPreview
 from tests.support.stalling_camera import StallingCamera
+from tests.support.undisturbed import without_stall
 from tests.support.waiting import wait_until
 
 pytestmark = pytest.mark.gst
@@ -60,6 +62,12 @@ def states(actual: pb.ActualState) -> dict[str, str]:
     return {
         each.name: pb.CameraState.Name(each.state).removeprefix("CAMERA_STATE_") for each in actual.cameras
     }
+
+
+def has_failed(camera: str, text: str, actual: pb.ActualState) -> bool:
+    error = next(each.error for each in actual.cameras if each.name == camera)
+    failed = states(actual)[camera] == "FAILED" and actual.wanted_camera == camera
+    return failed and text in error and camera in error
 
 
 def is_live(preview: RunningPreview, camera: str) -> pb.ActualState:
@@ -115,14 +123,15 @@ def test_a_camera_that_was_left_is_closed(tmp_path: Path) -> None:
         eye.sees("blue")
         choose(preview, "red")
         eye.sees("red")
-        threads, descriptors = preview.threads(), preview.descriptors()
+        # Pools of threads keep one for up to 20 s; what stayed open would add ten.
+        threads, descriptors = preview.threads() + 5, preview.descriptors() + 5
         for _ in range(10):
             choose(preview, "blue")
             is_live(preview, "blue")
             choose(preview, "red")
             is_live(preview, "red")
-        wait_until(lambda: preview.threads() <= threads, "no more threads than before")
-        wait_until(lambda: preview.descriptors() <= descriptors, "no more descriptors than before")
+        wait_until(lambda: preview.threads() < threads, "no more threads than before", 60)
+        wait_until(lambda: preview.descriptors() < descriptors, "no more descriptors than before", 60)
         assert preview.running().counters == pb.Counters(starts=1)
 
 
@@ -143,7 +152,12 @@ def test_a_camera_that_was_still_being_started_leaves_nothing(tmp_path: Path) ->
         wait_until(lambda: preview.descriptors() <= before, "no more descriptors than before")
 
 
+@pytest.mark.timeout(300)
 def test_a_camera_that_fails_to_start_costs_the_live_one_nothing(tmp_path: Path) -> None:
+    without_stall(failures_to_start_cost_nothing, tmp_path)
+
+
+def failures_to_start_cost_nothing(directory: Path) -> None:
     settings = cameras(
         red=RED,
         none=gst("filesrc location=/nowhere ! decodebin"),
@@ -152,26 +166,21 @@ def test_a_camera_that_fails_to_start_costs_the_live_one_nothing(tmp_path: Path)
         sound=gst("audiotestsrc is-live=true"),
         missing={"kind": "v4l2", "device": "/dev/not-there"},
     )
-    settings["timeouts"] = {"start_s": 1.0}
+    settings["timeouts"] = {"start_s": 2.0}
     words = {
         "none": 'failed: Resource not found (No such file "/nowhere")',
         "ends": "has ended",
-        "silent": "has sent no frame for 1.0 s",
+        "silent": "has sent no frame for 2.0 s",
         "sound": "does not deliver raw video",
         "missing": "/dev/not-there can't be used: No such file or directory",
     }
-    with watched(tmp_path, settings) as (preview, eye):
+    with watched(directory, settings) as (preview, eye):
         preview.wait_for(lambda it: states(it)["missing"] == "FAILED", "it is seen to be missing")
         begin = len(eye.seen)
         for camera, text in words.items():
             choose(preview, camera)
-            actual = preview.wait_for(
-                lambda it, camera=camera: states(it)[camera] == "FAILED" and it.wanted_camera == camera,  # type: ignore[misc]
-                camera,
-            )
-            error = next(each.error for each in actual.cameras if each.name == camera)
-            assert text in error
-            assert camera in error
+            # With this error: a start that was too slow on a busy machine is tried again.
+            actual = preview.wait_for(partial(has_failed, camera, text), f"{camera}: {text}")
             assert states(actual)["red"] == "LIVE"
             assert actual.state == pb.LIFECYCLE_STATE_RUNNING
         choose(preview, "red")
@@ -181,15 +190,20 @@ def test_a_camera_that_fails_to_start_costs_the_live_one_nothing(tmp_path: Path)
         assert preview.running().counters == pb.Counters(starts=1)
 
 
+@pytest.mark.timeout(300)
 @pytest.mark.parametrize("how", ["ends", "stalls", "fails"])
 def test_the_fallback_takes_over_in_the_same_connection(tmp_path: Path, how: str) -> None:
+    without_stall(partial(fallback_takes_over, how), tmp_path)
+
+
+def fallback_takes_over(how: str, directory: Path) -> None:
     with StallingCamera() as camera:
         front = {
             "ends": gst("videotestsrc is-live=true pattern=red num-buffers=90", fallback="rear"),
             "stalls": gst(camera.description, fallback="rear"),
             "fails": gst("videotestsrc is-live=true pattern=red ! identity error-after=90", fallback="rear"),
         }[how]
-        with watched(tmp_path, cameras(front=front, rear=BLUE)) as (preview, eye):
+        with watched(directory, cameras(front=front, rear=BLUE)) as (preview, eye):
             camera.stall()
             eye.sees("blue")
             actual = preview.wait_for(lambda it: states(it)["front"] == "FAILED", "front has failed")
@@ -225,8 +239,13 @@ def test_a_single_camera_has_a_name_as_well(tmp_path: Path, settings: dict[str, 
         assert preview.running().counters == pb.Counters(starts=1)
 
 
+@pytest.mark.timeout(300)
 def test_a_profile_and_a_camera_may_change_together(tmp_path: Path) -> None:
-    with watched(tmp_path, cameras(red=RED, blue=BLUE)) as (preview, eye):
+    without_stall(both_change, tmp_path)
+
+
+def both_change(directory: Path) -> None:
+    with watched(directory, cameras(red=RED, blue=BLUE)) as (preview, eye):
         begin = len(eye.seen)
         for number in range(6):
             preview.revision += 1
