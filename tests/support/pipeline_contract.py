@@ -81,15 +81,15 @@ class Events:
         self._changed.set()
 
 
-def plan_of(description: str, passphrase: str = "", start_s: float = 5.0) -> Plan:
-    """A small stream of x264."""
+def plan_of(description: str, passphrase: str = "", start_s: float = 20.0) -> Plan:
+    """A small stream of x264, with time enough for every frame on a machine that stalls."""
     small = ProfileSettings(width_px=320, height_px=240, bitrate_kbps=600, floor_kbps=150)
     faster = ProfileSettings(**asdict(FASTER))
     settings = PreviewSettings(
         source=GstSource(description=description),
         profiles=ProfilesSettings.model_validate({"balanced": small, "high-quality": faster}),
         srt=SrtSettings(bind="127.0.0.1", port=free_udp_port(), latency_ms=20),
-        timeouts=TimeoutSettings(start_s=start_s),
+        timeouts=TimeoutSettings(start_s=start_s, source_silence_s=10.0, encoder_silence_s=10.0),
     )
     desired = DesiredState(1, True, Profile.BALANCED, passphrase)
     source = sources.plan_camera(settings, "camera")

@@ -30,6 +30,10 @@ PROFILES = {
     "balanced": SMALL | {"fps": 30, "bitrate_kbps": 600, "floor_kbps": 150},
     "high_quality": SMALL | {"fps": 60, "bitrate_kbps": 900, "floor_kbps": 200},
 }
+# So that a stall of the machine is not taken for a silent camera or encoder: tests of silence state figures.
+PATIENT = {"start_s": 20, "source_silence_s": 10, "encoder_silence_s": 10}
+OF_A_SILENT_SOURCE = {"timeouts": {"start_s": 5, "source_silence_s": 1.5}}
+"""Settings where a source falls silent: with the service's own figures."""
 
 
 class NextState(Protocol):
@@ -43,7 +47,8 @@ class RunningPreview:
 
     Args:
         directory: for its configuration, socket and log.
-        settings: keys of the configuration that differ from the test's own: test pattern, x264, small frames.
+        settings: keys of the configuration that differ from the test's own: test pattern, x264, small frames,
+            and time enough for every frame.
         doubles: hardware encoders to pretend, element -> how it fails (see encoder_doubles).
         cameras: devices to pretend, device -> its formats and how it fails (see camera_doubles).
         small: whether frames are smaller than those of the service's own profiles.
@@ -74,6 +79,7 @@ class RunningPreview:
             "profiles": PROFILES if small else {},
             "srt": {"port": self.port, "bind": "127.0.0.1", "latency_ms": 20},
             "encoders": {"order": ["x264"]},
+            "timeouts": PATIENT,
         }
         self._config.write_text(
             yaml.safe_dump(_merged(own, settings or {}), sort_keys=False), encoding="utf-8"

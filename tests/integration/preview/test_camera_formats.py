@@ -13,7 +13,7 @@ import pytest
 
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from tests.support.colour_eye import Eye
-from tests.support.running_preview import RunningPreview
+from tests.support.running_preview import OF_A_SILENT_SOURCE, RunningPreview
 
 pytestmark = pytest.mark.gst
 
@@ -115,7 +115,7 @@ def test_a_camera_that_fails_is_a_fault_of_the_source(
     tmp_path: Path, mode: Any, fault: str, words: str
 ) -> None:
     cameras = {FRONT: offering(mode("red", 320, 240, 30), fault=fault)}
-    with RunningPreview(tmp_path, source(), cameras=cameras) as preview:
+    with RunningPreview(tmp_path, source() | OF_A_SILENT_SOURCE, cameras=cameras) as preview:
         preview.enable()
         state = preview.faulted(words)
         assert state.counters.fallbacks == 0, "no encoder is blamed"

@@ -22,7 +22,11 @@ from tests.support.watcher import Watcher
 pytestmark = pytest.mark.gst
 
 ENCODERS = ["mpp-h265", "va-h265", "x264"]
-ORDER = {"encoders": {"order": ENCODERS, "probe_timeout_s": 8}}
+TRIED = {"encoders": {"order": ENCODERS, "probe_timeout_s": 40}}
+ORDER = TRIED | {"timeouts": {"source_silence_s": 1.5, "encoder_silence_s": 1.0}}
+"""With the service's own figures, from which the promised outage follows."""
+PATIENT = TRIED | {"timeouts": {"encoder_silence_s": 20}}
+"""Where no encoder is silent."""
 MAX_OUTAGE_S = 2.0
 EXIT_HUNG = 70
 STOP_WITHIN_S = 5.0
@@ -59,6 +63,7 @@ def test_an_encoder_that_fails_its_trial_is_never_used(tmp_path: Path, fault: st
         assert state.counters == pb.Counters(starts=1)
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize("enabled", [False, True])
 def test_a_signal_ends_it_also_while_an_encoder_hangs_in_its_trial(tmp_path: Path, enabled: bool) -> None:
     settings = {"encoders": {"order": ["mpp-h265"], "probe_timeout_s": 60}}
@@ -72,7 +77,7 @@ def test_a_signal_ends_it_also_while_an_encoder_hangs_in_its_trial(tmp_path: Pat
 
 
 def test_an_element_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with RunningPreview(tmp_path, ORDER, {"vah265enc": "ok"}) as preview:
+    with RunningPreview(tmp_path, PATIENT, {"vah265enc": "ok"}) as preview:
         preview.enable()
         state = preview.running()
         assert state.encoder.name == "va-h265"
@@ -81,7 +86,7 @@ def test_an_element_that_is_not_there_is_named(tmp_path: Path) -> None:
 
 def test_software_on_a_robot_with_hardware_is_a_visible_fault(tmp_path: Path) -> None:
     doubles = {"mpph265enc": "no-output", "vah265enc": "null-to-ready"}
-    with RunningPreview(tmp_path, ORDER, doubles) as preview:
+    with RunningPreview(tmp_path, PATIENT, doubles) as preview:
         preview.enable()
         state = preview.running()
         assert state.encoder.name == "x264"
@@ -148,7 +153,7 @@ def fails_later(fault: str, words: str, directory: Path) -> float:
 
 
 def test_an_encoder_that_hangs_ends_the_process_when_the_preview_is_disabled(tmp_path: Path) -> None:
-    settings = ORDER | {"timeouts": {"stop_s": 1.0}}
+    settings = TRIED | {"timeouts": {"stop_s": 1.0, "encoder_silence_s": 5}}
     with RunningPreview(tmp_path, settings, {"mpph265enc": "later hang:5", "vah265enc": "ok"}) as preview:
         preview.enable()
         preview.wait_for(lambda a: a.encoder.name == "va-h265", "fallback")
@@ -274,7 +279,7 @@ def crashes_the_process(directory: Path) -> float:
 
 
 def test_an_encoder_is_not_blamed_for_a_process_that_was_killed(tmp_path: Path) -> None:
-    with RunningPreview(tmp_path, ORDER, {"mpph265enc": "ok", "vah265enc": "ok"}) as preview:
+    with RunningPreview(tmp_path, PATIENT, {"mpph265enc": "ok", "vah265enc": "ok"}) as preview:
         preview.enable()
         preview.running()
         preview.process.kill()

@@ -13,7 +13,7 @@ import pytest
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from tests.support.film import clip
 from tests.support.promise import keeps
-from tests.support.running_preview import RunningPreview
+from tests.support.running_preview import OF_A_SILENT_SOURCE, RunningPreview
 from tests.support.stalling_camera import StallingCamera
 from tests.support.waiting import wait_until
 from tests.support.watcher import Watcher
@@ -140,7 +140,10 @@ def test_a_description_that_makes_no_video_is_explained(tmp_path: Path, text: st
 
 
 def test_a_source_that_stalls_without_an_error_is_noticed(tmp_path: Path) -> None:
-    with StallingCamera() as camera, RunningPreview(tmp_path, description(camera.description)) as preview:
+    with (
+        StallingCamera() as camera,
+        RunningPreview(tmp_path, description(camera.description) | OF_A_SILENT_SOURCE) as preview,
+    ):
         preview.enable()
         preview.running()
         camera.stall()

@@ -149,7 +149,8 @@ def test_a_killed_tap_is_a_source_fault_and_its_return_mends_it(tap: RunningTap,
 
 
 def test_a_frozen_tap_is_a_source_fault_too(tap: RunningTap, tmp_path: Path) -> None:
-    with ros_camera(TOPIC), shown(tap, tmp_path) as (preview, eye):
+    settings = {"timeouts": {"start_s": 5, "source_silence_s": 3}}
+    with ros_camera(TOPIC), shown(tap, tmp_path, **settings) as (preview, eye):
         tap.process.send_signal(signal.SIGSTOP)
         preview.faulted("has sent no frame for")
         tap.process.send_signal(signal.SIGCONT)
@@ -159,7 +160,8 @@ def test_a_frozen_tap_is_a_source_fault_too(tap: RunningTap, tmp_path: Path) -> 
 
 def test_a_camera_that_is_slow_by_nature_is_no_fault(tap: RunningTap, tmp_path: Path) -> None:
     """A thermal camera, for example: every two seconds a picture, where others have failed after one."""
-    settings = {"source": ros(silence_s=9), "timeouts": PATIENT | {"source_silence_s": 1, "start_s": 20}}
+    timeouts = {"source_silence_s": 1, "encoder_silence_s": 1, "start_s": 20}
+    settings = {"source": ros(silence_s=9), "timeouts": timeouts}
     with ros_camera(TOPIC, hz=0.5) as published, preview_of(tap, tmp_path, **settings) as preview:
         preview.enable()
         preview.running()
@@ -342,7 +344,7 @@ def takes_over_when_its_time_has_come(tap: RunningTap, directory: Path) -> None:
     settings = {
         "cameras": {"front": {"kind": "test", "pattern": "green"}, "arm": ros(fallback="front")},
         # Less than the stamps lag.
-        "timeouts": {"source_silence_s": 3},
+        "timeouts": {"source_silence_s": 3, "encoder_silence_s": 1},
     }
     with ros_camera(TOPIC) as published, preview_of(tap, directory, **settings) as preview:
         published.age_s = lag_s
