@@ -7,12 +7,15 @@ from typing import NamedTuple, Self
 from console.receiver.address import StreamAddress
 from console.receiver.errors import StreamError
 from console.receiver.frame import Frame
+from console.receiver.options import ReceiverOptions
 from tests.support.receiver import NoFrameError, Receiver
 from tests.support.waiting import wait_until
 
 # Chroma of a plain colour, Cb and Cr (ITU-R BT.601).
 CHROMA = {"red": (90, 240), "green": (54, 34), "blue": (240, 110)}
 _RETRY_S = 0.1
+# A machine that stalls makes frames late, and no reason to connect anew.
+_PATIENT = ReceiverOptions(max_age_s=10.0)
 
 
 def colour(frame: Frame) -> str:
@@ -85,7 +88,7 @@ class Eye:
     def _watch(self) -> None:
         while not self._over.is_set():
             try:
-                with Receiver(self._address, queue_size=30) as receiver:
+                with Receiver(self._address, queue_size=30, options=_PATIENT) as receiver:
                     self._take(receiver)
             except StreamError:
                 self.reconnects += 1

@@ -60,7 +60,7 @@ class RealGround(Ground):
 
     @asynccontextmanager
     async def undisturbed(self) -> AsyncIterator[None]:
-        with Watcher(self._preview.port) as viewer:
+        with Watcher(self._preview.port, max_age_s=10.0) as viewer:
             await asyncio.to_thread(viewer.wait_for_frames, 5)
             yield
             await asyncio.to_thread(viewer.wait_for_frames, 5)

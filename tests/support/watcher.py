@@ -7,6 +7,7 @@ from typing import Self
 from common.backoff import Backoff
 from console.receiver.address import StreamAddress
 from console.receiver.errors import StreamError
+from console.receiver.options import MAX_AGE_S, ReceiverOptions
 from tests.support.receiver import NoFrameError, Receiver
 from tests.support.waiting import wait_until
 
@@ -18,13 +19,17 @@ class Watcher:
         port: the listener's.
         passphrase: of the stream.
         latency_ms: SRT latency.
+        max_age_s: age of the frames beyond which it connects anew.
     """
 
-    def __init__(self, port: int, passphrase: str = "", latency_ms: int = 20) -> None:
+    def __init__(
+        self, port: int, passphrase: str = "", latency_ms: int = 20, max_age_s: float = MAX_AGE_S
+    ) -> None:
         self.arrivals_s: list[float] = []
         self.codecs: list[str] = []
         self.reconnects = 0
         """How often it had to connect again."""
+        self._options = ReceiverOptions(max_age_s=max_age_s)
         self._address = StreamAddress("127.0.0.1", port, latency_ms=latency_ms, passphrase=passphrase)
         self._backoff = Backoff(first_s=0.1, longest_s=2.0)
         self._closing = threading.Event()
@@ -52,7 +57,7 @@ class Watcher:
     def _watch(self) -> None:
         while not self._closing.is_set():
             try:
-                with Receiver(self._address, queue_size=8) as receiver:
+                with Receiver(self._address, queue_size=8, options=self._options) as receiver:
                     self._take_frames(receiver)
             except StreamError as error:
                 if error.final:
