@@ -8,10 +8,10 @@ from typing import Any, ClassVar
 import pytest
 
 from common.gst import Gst, stop
-from preview.config import TimeoutSettings
 from preview.encoders.catalogue import CATALOGUE
 from preview.pipeline.events import Blame, HungError
 from preview.pipeline.runner import Runner
+from tests.support.eventually import eventually
 from tests.support.pipeline_contract import LIVE, Events, another, plan_of
 
 pytestmark = pytest.mark.gst
@@ -76,7 +76,7 @@ async def test_a_camera_that_hangs_when_it_has_been_replaced_is_left_behind() ->
     """The stream goes on with the new one; only the end of the process frees the driver of the old one."""
     events = Events()
     plan = plan_of("slowcamera")
-    short = TimeoutSettings(stop_s=0.3)
+    short = plan.settings.timeouts.model_copy(update={"stop_s": 1.0})
     plan = replace(plan, settings=plan.settings.model_copy(update={"timeouts": short}))
     pipeline = Runner(plan, events)
     await pipeline.start()
@@ -85,8 +85,13 @@ async def test_a_camera_that_hangs_when_it_has_been_replaced_is_left_behind() ->
         pipeline.show(another(name))
         await events.wait_for("camera_shown", number)
     await events.wait_for("measured", events.counts["measured"] + 3)
-    assert pipeline.measurement is not None
-    assert pipeline.measurement.fps > 20
+
+    async def fps() -> float:
+        assert pipeline.measurement is not None
+        return pipeline.measurement.fps
+
+    # Not in one window alone: a machine that stalls for a moment leaves it with few frames.
+    await eventually(fps, lambda found: found > 20, "frames per second")
     assert not events.faults
     with pytest.raises(HungError, match=r"source.description hung when it was stopped"):
         await pipeline.stop()
@@ -100,14 +105,14 @@ async def test_a_camera_that_hangs_when_it_has_been_replaced_is_left_behind() ->
 @pytest.mark.parametrize(
     ("description", "encoder", "blame", "text"),
     [
-        ("slowcamera", "x264enc", Blame.SOURCE, "source.description has not started within 0.5 s. Try it"),
-        (LIVE, "slowencoder", Blame.ENCODER, "encoder x264 has not started within 0.5 s"),
+        ("slowcamera", "x264enc", Blame.SOURCE, "source.description has not started within 2 s. Try it"),
+        (LIVE, "slowencoder", Blame.ENCODER, "encoder x264 has not started within 2 s"),
     ],
 )
 @pytest.mark.usefixtures("elements")
 async def test_the_one_that_blocks_is_blamed(description: str, encoder: str, blame: Blame, text: str) -> None:
     events = Events()
-    plan = replace(plan_of(description, start_s=0.5), encoder=replace(CATALOGUE["x264"], element=encoder))
+    plan = replace(plan_of(description, start_s=2.0), encoder=replace(CATALOGUE["x264"], element=encoder))
     pipeline = Runner(plan, events)
     await pipeline.start()
     (fault,) = events.faults

@@ -287,8 +287,8 @@ async def test_the_stream_goes_on_when_pts_wraps(
     stream = analyse(data)
     stamped = [unit.pts for unit in stream.access_units]
     assert (stamped != sorted(stamped)) is wraps
-    # A live source skips frames where it waits for a processor.
-    assert set(steps(stamped)) <= {3000 * frames for frames in range(1, 6)}
+    # A live source skips frames where it waits for a processor, for seconds on a machine that stalls.
+    assert set(steps(stamped)) <= {3000 * frames for frames in range(1, 5 * 30)}
     assert stream.counter_gaps == []
     assert clock_gaps_ms(stream) == pytest.approx(skips_ms(stamped), abs=1)
     assert clock_is_ahead_of_no_frame(stream)
