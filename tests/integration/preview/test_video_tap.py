@@ -6,6 +6,7 @@ import statistics
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any
 
 import pytest
@@ -22,9 +23,10 @@ from recorder.video.access_unit import Codec
 from recorder.video.stream import STREAM_NOTE
 from tests.support.free import udp_port_is_free
 from tests.support.judges import complaints, decoded_frames, stamps
-from tests.support.promise import keeps
+from tests.support.promise import MS, keeps
 from tests.support.running_preview import RunningPreview
 from tests.support.tap_reader import BareReader, TapRecording
+from tests.support.undisturbed import without_stall
 from tests.support.watcher import Watcher
 
 pytestmark = pytest.mark.gst
@@ -138,6 +140,8 @@ def test_viewers_stay_when_the_recording_ends(preview: Tapped) -> None:
     assert (state.state, state.counters.starts) == (LISTENING, 1)
 
 
+@pytest.mark.timed
+@pytest.mark.timeout(240)
 def test_every_encoded_frame_is_received_and_stamped_with_its_capture(tmp_path: Path) -> None:
     (tmp_path / "camera").mkdir()
     with camera(tmp_path / "camera") as stamping:
@@ -145,23 +149,39 @@ def test_every_encoded_frame_is_received_and_stamped_with_its_capture(tmp_path: 
             "source": {"kind": "gst", "description": stamping.source},
             "profiles": {"balanced": {"width_px": 1280, "height_px": 720, "bitrate_kbps": 2500}},
         }
-        with Tapped(tmp_path, settings) as preview, TapRecording(preview.tap) as recording:
-            recording.wait_for_frames(60)
-        samples, offset_ns = recording.samples, time.time_ns() - time.monotonic_ns()
-        stamped = stamps(film_of(samples, tmp_path))
-        assert len(stamped) == len(samples)
-        errors = [
-            (sample.publish_time_ns - offset_ns) / 1e6 - at_s * 1000
-            for sample, at_s in zip(samples, stamped, strict=True)
-            if at_s is not None
-        ]
-        assert len(errors) > len(samples) * 0.9
-        print(f"{len(errors)} stamps, {statistics.median(errors):.2f} ms, at most {max(errors):.2f} ms")
-        assert min(errors) > -2
-        assert statistics.median(errors) <= FRAME_MS
+
+        def median_ms() -> float:
+            directory = Path(mkdtemp(dir=tmp_path))
+            with Tapped(directory, settings) as preview, TapRecording(preview.tap) as recording:
+                recording.wait_for_frames(60)
+            return median_error_ms(recording.samples, directory)
+
+        keeps(FRAME_MS, "ms from the stamp to the capture time", median_ms, per_stalled_s=MS)
 
 
+def median_error_ms(samples: list[Sample], directory: Path) -> float:
+    """How much later than its stamp a frame says that it was captured."""
+    offset_ns = time.time_ns() - time.monotonic_ns()
+    stamped = stamps(film_of(samples, directory))
+    assert len(stamped) == len(samples)
+    errors = [
+        (sample.publish_time_ns - offset_ns) / 1e6 - at_s * 1000
+        for sample, at_s in zip(samples, stamped, strict=True)
+        if at_s is not None
+    ]
+    assert len(errors) > len(samples) * 0.9
+    print(f"{len(errors)} stamps, {statistics.median(errors):.2f} ms, at most {max(errors):.2f} ms")
+    assert min(errors) > -2
+    return statistics.median(errors)
+
+
+@pytest.mark.timeout(300)
 def test_a_reader_that_lags_loses_frames_up_to_a_key_frame_and_the_preview_none(tmp_path: Path) -> None:
+    # In a stall the reader lags, too, that is to lose nothing.
+    without_stall(one_lags_and_one_does_not, tmp_path)
+
+
+def one_lags_and_one_does_not(directory: Path) -> None:
     noise = "videotestsrc is-live=true pattern=snow"
     big = {"width_px": 1280, "height_px": 720, "fps": 30, "bitrate_kbps": 60_000, "floor_kbps": 500}
     settings = {
@@ -169,7 +189,7 @@ def test_a_reader_that_lags_loses_frames_up_to_a_key_frame_and_the_preview_none(
         "profiles": {"balanced": big},
         "encoders": {"order": ["x264"], "key_frame_interval_s": 0.5},
     }
-    with Tapped(tmp_path, settings) as preview, BareReader(preview.tap) as lagging:
+    with Tapped(directory, settings) as preview, BareReader(preview.tap) as lagging:
         with TapRecording(preview.tap) as recording:
             while sum(len(each.data) for each in recording.samples) < 3 * MAX_WAITING_BYTES:
                 recording.wait_for_frames(5)
@@ -192,13 +212,16 @@ def test_a_killed_preview_is_a_gap_up_to_a_key_frame(preview: Tapped) -> None:
         recording.wait_for_frames(10)
         preview.process.send_signal(signal.SIGKILL)
         preview.process.wait()
-        before = len(recording.samples)
         preview.start_again()
-        recording.wait_for(lambda: len(recording.samples) > before + 10, "frames of the next process")
+        # What it sent before its end is read until then.
+        recording.wait_for(lambda: recording.losses, "the gap")
+        recording.wait_for_frames(10)
         (loss,) = recording.losses
         assert recording.tap.connections >= 2
     assert (loss.cause, loss.messages) == (GapCause.VIDEO, None)
-    last, first = recording.samples[before - 1], recording.samples[before]
+    at = recording.items.index(loss)
+    last = [item for item in recording.items[:at] if isinstance(item, Sample)][-1]
+    first = next(item for item in recording.items[at:] if isinstance(item, Sample))
     assert is_key_frame(first)
     assert (loss.began_ns, loss.ended_ns) == pytest.approx(
         (last.publish_time_ns, first.publish_time_ns), abs=1e6
