@@ -234,19 +234,20 @@ def test_a_reset_waits_until_a_source_that_moved_the_robot_can_be_heard(robot: D
     message.twist.linear.x = 0.2
 
     def attempt() -> None:
-        peer = robot.ready()
+        peer, moved_ns = robot.ready(), 0
         with robot.same_worker():
             with ros_node("unheard") as node:
                 publisher = node.create_publisher(type(message), mux_output.topic, 1)
 
                 def is_seen() -> bool:
+                    nonlocal moved_ns
+                    moved_ns = time.monotonic_ns()
                     publisher.publish(message)
                     return "moves the robot" in robot.state().reset_obstacle
 
                 peer.send(stop="ben")
                 robot.phase_is("STOPPED")
                 wait_until(is_seen, "a source that no input shows moves the base")
-            moved_ns = time.monotonic_ns()
             wait_until(lambda: "moves the robot" not in robot.state().reset_obstacle, "it is silent")
             assert "what else commands the robot" in robot.state().reset_obstacle
             wait_until(lambda: not robot.state().reset_obstacle, "it would have been heard")

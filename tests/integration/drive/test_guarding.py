@@ -70,7 +70,8 @@ def test_nothing_moves_before_the_guards_own_zeros_would_arrive(
             peer.send(held=True)
             since_ns = time.monotonic_ns()
             wait_until(lambda: robot.state().monotonic_ns > since_ns + 1_000_000_000, "a second")
-            assert list(robot.state().inhibits) == [pb.INHIBIT_BASE_ABSENT]
+            # A driver whom the machine holds up is late meanwhile, which is another reason.
+            wait_until(lambda: list(robot.state().inhibits) == [pb.INHIBIT_BASE_ABSENT], "the one reason")
             assert not robot.witness.motion_since(since_ns)
             guard.say(ENOUGH)
             robot.drive()
