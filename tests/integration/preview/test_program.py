@@ -8,12 +8,14 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from tempfile import mkdtemp
 
 import psutil
 import pytest
 
 from common.guard import EXIT_SILENT
 from tests.support.processes import has_ended
+from tests.support.promise import keeps
 from tests.support.running_preview import ROOT, RunningPreview
 from tests.support.waiting import wait_until
 
@@ -102,9 +104,14 @@ def test_a_signal_ends_it_with_everything_tidy(preview: RunningPreview, number: 
 
 
 @pytest.mark.timed
+@pytest.mark.timeout(240)
 def test_frozen_it_is_killed_by_its_guard(tmp_path: Path) -> None:
     """Documented: within 11 s; what runs in the container."""
-    path = tmp_path / "preview.sock"
+    keeps(11, "s from the freeze to the guard's end", lambda: killed_after_s(Path(mkdtemp(dir=tmp_path))))
+
+
+def killed_after_s(directory: Path) -> float:
+    path = directory / "preview.sock"
     with subprocess.Popen(
         [sys.executable, "-m", "common.guard", sys.executable, "-m", "preview.cli", "serve"],
         cwd=ROOT,
@@ -112,13 +119,17 @@ def test_frozen_it_is_killed_by_its_guard(tmp_path: Path) -> None:
         stderr=subprocess.PIPE,
         text=True,
     ) as guard:
-        wait_until(path.exists, "the service is up", 30)
-        (service,) = psutil.Process(guard.pid).children()
-        service.suspend()
-        frozen_s = time.monotonic()
-        assert guard.wait(30) == EXIT_SILENT
-        assert time.monotonic() - frozen_s < 11
-        assert has_ended(service.pid)
+        try:
+            wait_until(path.exists, "the service is up", 30)
+            (service,) = psutil.Process(guard.pid).children()
+            service.suspend()
+            frozen_s = time.monotonic()
+            assert guard.wait(30) == EXIT_SILENT
+            took_s = time.monotonic() - frozen_s
+            assert has_ended(service.pid)
+        finally:
+            guard.terminate()
+        return took_s
 
 
 def test_encoders_are_listed_for_people_and_programs() -> None:
@@ -126,7 +137,7 @@ def test_encoders_are_listed_for_people_and_programs() -> None:
     assert table.returncode == 0, table.stderr
     row = next(line for line in table.stdout.splitlines() if " x264enc " in line)
     assert row.split()[:6] == ["x264", "x264", "x264enc", "h264", "yes", "yes"]
-    rows = json.loads(run("encoders", "--json").stdout)
+    rows = json.loads(run("encoders", "--json", PREVIEW__ENCODERS__PROBE_TIMEOUT_S="40").stdout)
     by_name = {one["name"]: one for one in rows}
     assert by_name["x264"]["proven"] is True
     assert by_name["x264"]["first_byte_ms"] > 0

@@ -121,7 +121,7 @@ def test_a_profile_switch_keeps_every_viewer(preview: RunningPreview) -> None:
 
 
 def test_unwatched_it_stops_by_itself_and_the_same_request_enables_it_again(tmp_path: Path) -> None:
-    with RunningPreview(tmp_path, {"timeouts": {"without_gateway_s": 1.0}}) as preview:
+    with RunningPreview(tmp_path, {"timeouts": {"without_gateway_s": 3.0}}) as preview:
         desired = pb.DesiredState(revision=4, enabled=True, profile=pb.PROFILE_BALANCED)
         preview.apply(desired)
         wait_until(lambda: "stopped by itself" in preview.log.read_text(encoding="utf-8"), "unwatched")
@@ -150,7 +150,8 @@ def test_encoders_are_listed_in_the_order_of_preference(preview: RunningPreview)
 
 
 def test_h265_in_software_from_end_to_end(tmp_path: Path) -> None:
-    with RunningPreview(tmp_path, {"encoders": {"order": ["x264", "x265"], "codec": "h265"}}) as preview:
+    encoders = {"order": ["x264", "x265"], "codec": "h265", "probe_timeout_s": 40}
+    with RunningPreview(tmp_path, {"encoders": encoders}) as preview:
         preview.enable()
         state = preview.running()
         assert state.stream.codec == pb.CODEC_H265
@@ -160,6 +161,7 @@ def test_h265_in_software_from_end_to_end(tmp_path: Path) -> None:
         assert set(watcher.codecs) == {"h265"}
 
 
+@pytest.mark.timeout(300)
 def test_again_and_again_leaves_nothing_behind(preview: RunningPreview) -> None:
     """The short form of the soak (bench/soak/programs.py)."""
     memory_mib: list[float] = []
