@@ -46,7 +46,7 @@ def test_health_by_the_standard_service_inside_and_out(demo: Deployment) -> None
     assert state_of(target, "nobody").startswith("NOT_FOUND")
 
     demo.run("stop", "preview")
-    wait_until(lambda: state_of(target, "preview") == "NOT_SERVING", "the preview is told to be gone")
+    wait_until(lambda: state_of(target, "preview") == "NOT_SERVING", "the gateway says that the preview is gone")
     assert state_of(target) == "SERVING", "a dead preview is no fault of the gateway's"
 
 
