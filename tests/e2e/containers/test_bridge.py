@@ -263,13 +263,16 @@ def change_modes(fleet: Fleet, times: int) -> None:
         wait_until(lambda: knows(robot), "the gateway answers", BACK_WITHIN_S)
         # Of what is published before the gateway has discovered the topic it gets the newest alone.
         status_with(robot, lambda it: it.mission.available, "the gateway hears the mode", BACK_WITHIN_S)
-    before = issued(fleet)
+    before, published = issued(fleet), 0
 
     def reported() -> bool:
+        nonlocal published
         # Modes that come while robot or gateway stands still are one event.
         missing = times - issued_since(fleet, before)
         if missing > 0:
+            assert published <= 2 * times, "the gateway loses modes"
             fleet.deployment.run("exec", "robot", "python", "-c", MODES, str(missing))
+            published += missing
         return missing <= 0
 
     wait_until(reported, "the gateway reports them", BACK_WITHIN_S)

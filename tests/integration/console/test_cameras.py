@@ -77,6 +77,7 @@ def test_switching_cameras_from_a_terminal(ground: VideoGround) -> None:
     ]
 
 
+@pytest.mark.timeout(300)
 def test_what_a_program_learns_of_a_camera_that_fails(tmp_path: Path) -> None:
     def attempt() -> None:
         # Without frames for a moment, as in a stall, a pipeline is started anew.

@@ -47,6 +47,7 @@ def test_an_example_prints_what_it_says(example: Example, target: str, tmp_path:
     prints_what_it_says(example, target, tmp_path)
 
 
+@pytest.mark.timeout(300)
 @pytest.mark.ros
 @pytest.mark.parametrize("example", DRIVING, ids=lambda example: f"example-{example.number}")
 def test_an_example_of_driving_moves_a_robot(

@@ -38,6 +38,7 @@ def findings(done: subprocess.CompletedProcess[str]) -> dict[str, dict[str, str]
     return {each["check"]: each for each in json.loads(done.stdout)["findings"]}
 
 
+@pytest.mark.timeout(300)
 def test_the_doctor_finds_mux_base_and_timeout_and_measures_what_a_pulse_does(robot: Driving) -> None:
     config = str(robot.directory / "drive.yaml")
 

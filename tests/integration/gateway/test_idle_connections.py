@@ -222,7 +222,9 @@ def test_a_throttled_peer_is_answered_slowly_until_it_is_released() -> None:
             accepted.sendall(b"x" * 1000)
             missing = 3000
             while missing:
-                missing -= len(peer.recv(4000))
+                more = peer.recv(4000)
+                assert more, "it was closed"
+                missing -= len(more)
             assert time.monotonic() - began_s > 0.9, "a second for each but the first"
             sockets.throttle(address, UNLIMITED)
             began_s = time.monotonic()

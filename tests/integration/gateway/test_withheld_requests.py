@@ -14,7 +14,7 @@ import psutil
 import pytest
 
 from bench.siege.tls import careless_context
-from console.client import GatewayError
+from console.client import GatewayClient, GatewayError
 from tests.support.guarded_gateway import guarded_gateway, new_robot
 from tests.support.guarded_program import guarded_program
 from tests.support.http2 import BEGINNING, END_HEADERS, GET_SYSTEM_STATUS, HEADERS, STOP_ROBOT, frame
@@ -81,7 +81,11 @@ def stopped(client: Any) -> str:
 @pytest.mark.timed
 @pytest.mark.parametrize("headers", [GET_SYSTEM_STATUS, STOP_ROBOT], ids=["statuses", "stops"])
 def test_strangers_take_no_room_of_stops(tmp_path: Path, headers: bytes) -> None:
-    with guarded_program(tmp_path, tmp_path / "home") as robot, robot.client() as client:
+    with (
+        guarded_program(tmp_path, tmp_path / "home") as robot,
+        # Its 2 s for an answer are judged, too: the strangers are gone after 10 s, and no stop waits then.
+        GatewayClient(robot.target, credentials=robot.own) as client,
+    ):
         client.status()
         gateway = psutil.Process(robot.pid)
         before_mib = gateway.memory_info().rss / MIB

@@ -328,6 +328,7 @@ def test_three_cameras_of_which_one_is_a_topic(tap: RunningTap, tmp_path: Path) 
             assert preview.running().counters == pb.Counters(starts=1)
 
 
+@pytest.mark.timeout(300)
 def test_a_camera_whose_stamps_lag_takes_over_when_its_time_has_come(tap: RunningTap, tmp_path: Path) -> None:
     """Its frames are older than the last one that was shown: they wait, and the camera is not to blame."""
 

@@ -117,6 +117,7 @@ def test_the_robot_learns_the_worst_age(tmp_path: Path, stamping: Camera) -> Non
         assert 0 < measured.worst_picture_age_ms < 10_000
 
 
+@pytest.mark.timeout(300)
 def test_a_torn_picture_is_repaired_by_a_key_frame_of_the_robot(
     tmp_path: Path, stamping: Camera, monkeypatch: pytest.MonkeyPatch
 ) -> None:

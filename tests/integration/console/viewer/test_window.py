@@ -145,6 +145,7 @@ def hue_on_screen(view: ViewWindow) -> str:
     return "red" if colour.red() > colour.blue() else "blue" if colour.blue() > colour.red() else "none"
 
 
+@pytest.mark.timeout(300)
 def test_a_person_changes_the_camera_with_a_key(tmp_path: Path) -> None:
     cameras = {name: {"kind": "test", "pattern": name} for name in ("red", "blue")}
     with video_ground(tmp_path, {"cameras": cameras}) as ground:

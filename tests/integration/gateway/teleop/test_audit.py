@@ -22,7 +22,7 @@ from tests.support.running_drive import listening_base, running_drive
 from tests.support.undisturbed import DisturbedError, no_stall, same_worker, undisturbed_async
 
 # Timed: on a machine that is busy with other tests, a late command would end the motion.
-pytestmark = [pytest.mark.ros, pytest.mark.timed]
+pytestmark = [pytest.mark.ros, pytest.mark.timed, pytest.mark.timeout(300)]
 SPEED_MPS = 0.1
 RELEASED = "released"
 """What ends no motion here, unless a stall does."""

@@ -101,6 +101,7 @@ async def held(
     return reasons
 
 
+@pytest.mark.timeout(300)
 @pytest.mark.parametrize("profile", [PreviewProfile.LOW_BW, PreviewProfile.BALANCED])
 async def test_it_drives_by_what_the_viewer_shows(scene: Scene, profile: PreviewProfile) -> None:
     """No picture that the robot has sent is taken for one that it can't have sent."""
