@@ -50,6 +50,9 @@ class StatusStream:
         self._watchers: set[_Watcher] = set()
         self._watched = asyncio.Event()
         self._tick = 0
+        self._counts_for = 0
+        """A snapshot taken between two ticks, as the loop had been held up, counts for the later one; for all
+        watchers alike."""
         self._versions = {False: 0, True: 0}
         """Of the status without and with detections."""
         self._snapshot = state.snapshot()
@@ -90,9 +93,9 @@ class StatusStream:
                     watcher.wake = loop.create_future()
                     await watcher.wake
                     watcher.wake = None
-                # When the loop was held up, a newer one is sent, as at the next tick: it counts for that.
-                tick = self._tick + 1 if self._refresh_if_older_than(_TICK_S) else self._tick
-                watcher.pacing.sent(tick, self._versions[with_detections])
+                if self._refresh_if_older_than(_TICK_S):
+                    self._counts_for = self._tick + 1
+                watcher.pacing.sent(max(self._tick, self._counts_for), self._versions[with_detections])
 
     @contextmanager
     def _watching(self, min_interval_ms: int, with_detections: bool) -> Iterator[_Watcher]:
