@@ -1,5 +1,6 @@
 """Fixtures that every test may use; each plugin says what it offers."""
 
+import os
 import signal
 
 from hypothesis import settings
@@ -16,6 +17,9 @@ pytest_plugins = [
 
 def pytest_configure() -> None:
     """Sets what holds for every test of the process."""
+    # gRPC's handlers of a fork are for children that go on in Python. Where `subprocess` forks to change the
+    # user, they have crashed one child in thirty before its exec, and have hung others (gRPC 1.85).
+    os.environ.setdefault("GRPC_ENABLE_FORK_SUPPORT", "0")
     # A run in the background inherits ignored signals and would pass them on to the programs under test.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     for number in (signal.SIGHUP, signal.SIGQUIT):
