@@ -115,6 +115,16 @@ async def undisturbed_async(attempt: Callable[[], Awaitable[T]]) -> T:
     return _give_up()
 
 
+async def without_stall_async(attempt: Callable[[Path], Awaitable[T]], directory: Path) -> T:
+    """As `without_stall`, in an event loop."""
+
+    async def once() -> T:
+        with no_stall():
+            return await attempt(Path(mkdtemp(dir=directory)))
+
+    return await undisturbed_async(once)
+
+
 def _check(worker: psutil.Process, log: Path, logged_bytes: int, cause: Exception | None = None) -> None:
     ended, _ = psutil.wait_procs([worker], timeout=_ENDS_WITHIN_S)
     if not ended:

@@ -3,7 +3,6 @@
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from tempfile import mkdtemp
 
 import pytest
 
@@ -11,7 +10,7 @@ from console.client import CameraState, CaughtUp, GatewayClient, InvalidRequest,
 from console.client.results import Event
 from tests.support.patient import PATIENT
 from tests.support.robotctl import robotctl
-from tests.support.undisturbed import no_stall, undisturbed
+from tests.support.undisturbed import without_stall
 from tests.support.video_ground import VideoGround, video_ground
 from tests.support.waiting import wait_until
 from tests.support.watcher import Watcher
@@ -79,16 +78,15 @@ def test_switching_cameras_from_a_terminal(ground: VideoGround) -> None:
 
 @pytest.mark.timeout(300)
 def test_what_a_program_learns_of_a_camera_that_fails(tmp_path: Path) -> None:
-    def attempt() -> None:
-        # Without frames for a moment, as in a stall, a pipeline is started anew.
+    def attempt(directory: Path) -> None:
         with (
-            no_stall(),
-            video_ground(Path(mkdtemp(dir=tmp_path)), {"cameras": CAMERAS}) as ground,
+            video_ground(directory, {"cameras": CAMERAS}) as ground,
             GatewayClient(ground.target, PATIENT) as robot,
         ):
             a_camera_fails(robot)
 
-    undisturbed(attempt)
+    # Without frames for a moment, as in a stall, a pipeline is started anew.
+    without_stall(attempt, tmp_path)
 
 
 def a_camera_fails(robot: GatewayClient) -> None:

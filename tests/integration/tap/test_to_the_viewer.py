@@ -5,8 +5,8 @@ import os
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from tempfile import mkdtemp
 from typing import Any
 
 import pytest
@@ -18,7 +18,7 @@ from tests.support.recording import record
 from tests.support.ros_camera import RosCamera, compressed, jpeg, picture, ros_camera
 from tests.support.running_preview import RunningPreview
 from tests.support.running_tap import RunningTap
-from tests.support.undisturbed import no_stall, undisturbed
+from tests.support.undisturbed import without_stall
 from tests.support.waiting import wait_until
 
 pytestmark = [pytest.mark.ros, pytest.mark.gst]
@@ -331,13 +331,8 @@ def test_three_cameras_of_which_one_is_a_topic(tap: RunningTap, tmp_path: Path) 
 @pytest.mark.timeout(300)
 def test_a_camera_whose_stamps_lag_takes_over_when_its_time_has_come(tap: RunningTap, tmp_path: Path) -> None:
     """Its frames are older than the last one that was shown: they wait, and the camera is not to blame."""
-
-    def attempt() -> None:
-        # With the machine a camera may stand still for longer than it may be silent.
-        with no_stall():
-            takes_over_when_its_time_has_come(tap, Path(mkdtemp(dir=tmp_path)))
-
-    undisturbed(attempt)
+    # With the machine a camera may stand still for longer than it may be silent.
+    without_stall(partial(takes_over_when_its_time_has_come, tap), tmp_path)
 
 
 def takes_over_when_its_time_has_come(tap: RunningTap, directory: Path) -> None:

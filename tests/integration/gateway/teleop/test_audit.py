@@ -4,10 +4,9 @@ import asyncio
 import json
 import os
 import signal
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from tempfile import mkdtemp
 from typing import Any
 
 import pytest
@@ -19,7 +18,7 @@ from tests.support.eventually import eventually
 from tests.support.guarded_program import Guarded, guarded_program
 from tests.support.heard import Base
 from tests.support.running_drive import listening_base, running_drive
-from tests.support.undisturbed import DisturbedError, no_stall, same_worker, undisturbed_async
+from tests.support.undisturbed import DisturbedError, same_worker, without_stall_async
 
 # Timed: on a machine that is busy with other tests, a late command would end the motion.
 pytestmark = [pytest.mark.ros, pytest.mark.timed, pytest.mark.timeout(300)]
@@ -34,17 +33,6 @@ def guarded(directory: Path) -> Iterator[tuple[Guarded, Base]]:
         teleop = {"socket": str(drive.socket), "line_of_sight": True}
         with guarded_program(directory, directory, teleop=teleop) as robot, same_worker(drive):
             yield robot, base
-
-
-async def driven_undisturbed(directory: Path, attempt: Callable[[Path], Awaitable[None]]) -> None:
-    """Makes attempts, each in a directory of its own, until no stall has ended a motion or begun another."""
-
-    async def begun() -> None:
-        own = Path(mkdtemp(dir=directory))
-        with no_stall():
-            await attempt(own)
-
-    await undisturbed_async(begun)
 
 
 def records(file: Path) -> list[dict[str, Any]]:
@@ -65,7 +53,7 @@ async def test_who_drove_who_stopped_and_who_was_refused(tmp_path: Path) -> None
         with guarded(directory) as (robot, base):
             await driven_stopped_and_refused(robot, base, directory)
 
-    await driven_undisturbed(tmp_path, attempt)
+    await without_stall_async(attempt, tmp_path)
 
 
 async def driven_stopped_and_refused(robot: Guarded, base: Base, directory: Path) -> None:
@@ -123,7 +111,7 @@ async def driven_stopped_and_refused(robot: Guarded, base: Base, directory: Path
 
 @pytest.mark.usefixtures("module_ros_domain")
 async def test_a_motion_that_a_killed_gateway_left_is_recorded_by_the_next(tmp_path: Path) -> None:
-    await driven_undisturbed(tmp_path, motion_left_by_a_killed_gateway)
+    await without_stall_async(motion_left_by_a_killed_gateway, tmp_path)
 
 
 async def motion_left_by_a_killed_gateway(directory: Path) -> None:
