@@ -2,10 +2,12 @@
 
 import shutil
 import subprocess
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 import yaml
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
 
 ROOT = Path(__file__).parents[2]
 BUF = ROOT / ".venv/bin/buf"
@@ -14,6 +16,18 @@ V1_IMAGE = LOCKED / "gateway-v1.binpb"
 RELEASE_IMAGE = LOCKED / "0.1.0.binpb"
 V1 = Path("proto/omniseer/gateway/v1")
 PRIVATE = Path("proto/omniseer/preview/v1/preview_service.proto")
+
+
+def test_what_is_added_to_a_message_of_the_locked_contract_starts_at_16() -> None:
+    """The numbers below belong to that contract, used or not (proto/locked/README.md)."""
+    added = []
+    for file in FileDescriptorSet.FromString(V1_IMAGE.read_bytes()).file:
+        module = import_module(f"{file.name.removesuffix('.proto').replace('/', '.')}_pb2")
+        for locked in file.message_type:
+            numbers = {field.number for field in locked.field}
+            fields = module.DESCRIPTOR.message_types_by_name[locked.name].fields
+            added += [each.full_name for each in fields if each.number < 16 and each.number not in numbers]
+    assert added == []
 
 
 @pytest.fixture

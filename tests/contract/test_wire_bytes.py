@@ -119,8 +119,8 @@ CASES = [
     ),
     Case(
         robot_gateway_pb2.SetPreviewModeRequest,
-        uint(1, 1) + uint(2, 3) + text(3, "rear"),
-        {"enabled": True, "profile": preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY, "camera": "rear"},
+        uint(1, 1) + uint(2, 3),
+        {"enabled": True, "profile": preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY},
     ),
     Case(
         robot_gateway_pb2.SetPreviewModeResponse,
@@ -365,6 +365,7 @@ CASES = [
 
 # What was added to the locked contract: from 16 up in its messages, from 1 in messages of its own.
 ADDITIONS = [
+    Case(robot_gateway_pb2.SetPreviewModeRequest, text(16, "rear"), {"camera": "rear"}),
     Case(
         system_status_pb2.SystemStatus,
         uint(16, 1)
