@@ -15,7 +15,9 @@ from console.client import Offset, PictureDelivery, PictureReport, PreviewStatus
 from console.receiver.delivery import Delivery, DeliveryChoice
 from console.receiver.frame import Frame
 from console.viewer.picture_reading import (
+    OVERDUE_S,
     AgeCause,
+    Freeze,
     PictureReading,
     ShownPicture,
     age_now_ms,
@@ -25,6 +27,8 @@ from console.viewer.picture_reading import (
 
 _KEPT: Final = 3600
 """Pictures: a minute at 60 frames/s."""
+_FREEZES_KEPT: Final = 600
+"""A minute of them: each lasts for more than OVERDUE_S."""
 HISTORY_SLOTS: Final = 120
 SLOT_S: Final = 0.5
 _LONGEST_MS: Final = 60_000
@@ -40,7 +44,7 @@ class AgeSummary:
     Args:
         median_ms: half of them were younger.
         p95_ms: 95 % of them were younger.
-        worst_ms: the oldest.
+        worst_ms: the largest age of a picture on the screen, while the next one was overdue as well.
         error_ms: bound of the error of all ages.
         cause: why the last picture was older than 150 ms; None if it was not.
     """
@@ -76,6 +80,8 @@ class PictureMeter:
         self._viewer_id = secrets.token_hex(4)
         self._lock = threading.Lock()
         self._shown: deque[ShownPicture] = deque(maxlen=_KEPT)
+        self._freezes: deque[Freeze] = deque(maxlen=_FREEZES_KEPT)
+        """Those that have ended, in their order."""
         self._latest: ShownPicture | None = None
         """The picture on the screen; None while none is, or its age is unknown."""
         self._reported_s = 0.0
@@ -100,13 +106,21 @@ class PictureMeter:
         own_ms = None if frame.received_s is None else (now_s - frame.received_s) * _MS_PER_S
         picture = ShownPicture(now_s, max(0.0, age_ms), offset.error_s * _MS_PER_S, own_ms, frame.capture_ns)
         with self._lock:
+            self._end_latest(now_s)
             self._shown.append(picture)
             self._latest, self._suspended = picture, SuspendedTime()
 
     def forget(self) -> None:
         """Notes that no picture is on the screen any more; history and summary keep those that were."""
         with self._lock:
+            self._end_latest(time.monotonic())
             self._latest = None
+
+    def _end_latest(self, now_s: float) -> None:
+        """Notes the freeze that the picture on the screen was, if it was one."""
+        if self._latest and now_s - self._latest.at_s > OVERDUE_S:
+            age_ms = age_now_ms(self._latest, self._now_s())
+            self._freezes.append(Freeze(self._latest, now_s, age_ms))
 
     def reading(self) -> PictureReading:
         """Returns the reading of this moment."""
@@ -130,14 +144,21 @@ class PictureMeter:
     def history(self) -> list[float | None]:
         """Returns the largest age in each half second of the last minute, the newest last.
 
-        None stands for half a second without a new picture.
+        None stands for half a second without a picture of known age.
         """
-        newest = int(time.monotonic() / SLOT_S)
+        oldest = int(time.monotonic() / SLOT_S) - HISTORY_SLOTS + 1
         worst: list[float | None] = [None] * HISTORY_SLOTS
-        for picture in self._pictures():
-            slot = HISTORY_SLOTS - 1 - newest + int(picture.at_s / SLOT_S)
+
+        def note(slot: int, age_ms: float) -> None:
             if 0 <= slot < HISTORY_SLOTS:
-                worst[slot] = max(worst[slot] or 0.0, picture.age_ms)
+                worst[slot] = max(worst[slot] or 0.0, age_ms)
+
+        for picture in self._pictures():
+            note(int(picture.at_s / SLOT_S) - oldest, picture.age_ms)
+        for freeze in self._all_freezes():
+            first, last = (int(at_s / SLOT_S) - oldest for at_s in (freeze.picture.at_s, freeze.until_s))
+            for slot in range(max(first, 0), min(last, HISTORY_SLOTS - 1) + 1):
+                note(slot, freeze.age_at_ms((oldest + slot + 1) * SLOT_S))
         return worst
 
     def worst_ms(self, within_s: float) -> float | None:
@@ -145,8 +166,7 @@ class PictureMeter:
         now_s, latest = self._now_s(), self.latest()
         if latest is None:
             return None
-        recent = takewhile(lambda each: each.at_s > now_s - within_s, reversed(self._pictures()))
-        return max([age_now_ms(latest, now_s), *(each.age_ms for each in recent)])
+        return max(age_now_ms(latest, now_s), self._worst_since_ms(time.monotonic() - within_s))
 
     def summary(self) -> AgeSummary | None:
         """Returns the ages of the last pictures; None without one of known age."""
@@ -160,7 +180,7 @@ class PictureMeter:
         return AgeSummary(
             median_ms=round(statistics.median(ages_ms), 1),
             p95_ms=round(p95_ms, 1),
-            worst_ms=round(max(ages_ms), 1),
+            worst_ms=round(self._worst_since_ms(0.0), 1),
             error_ms=round(max(picture.error_ms for picture in pictures), 2),
             cause=reading(last, self._delivery(), self._preview(), last.at_s).cause,
         )
@@ -172,8 +192,8 @@ class PictureMeter:
         latest = self.latest()
         if latest is None:
             return None
-        since = list(takewhile(lambda each: each.at_s > since_s, reversed(self._pictures())))
-        age_ms = max([age_now_ms(latest, self._now_s()), *(each.age_ms for each in since)])
+        age_ms = max(age_now_ms(latest, self._now_s()), self._worst_since_ms(since_s))
+        since = takewhile(lambda each: each.at_s > since_s, reversed(self._pictures()))
         of_link_ms = max([link_age_ms(latest, now_s, self._received()), *(each.link_ms for each in since)])
         delivery = self._delivery()
         rtt_ms = delivery.rtt_ms if delivery else None
@@ -193,6 +213,23 @@ class PictureMeter:
     def _now_s(self) -> float:
         """Returns the time by which the picture on the screen gets older: in a suspend, too."""
         return time.monotonic() + self._suspended.seconds()
+
+    def _worst_since_ms(self, since_s: float) -> float:
+        """Returns the largest age of pictures that were shown, or left the screen late, since then; or 0."""
+        shown = takewhile(lambda each: each.at_s > since_s, reversed(self._pictures()))
+        with self._lock:
+            freezes = tuple(self._freezes)
+        late = takewhile(lambda each: each.until_s > since_s, reversed(freezes))
+        return max([0.0, *(each.age_ms for each in shown), *(each.age_ms for each in late)])
+
+    def _all_freezes(self) -> tuple[Freeze, ...]:
+        """Returns the freezes, with the present one if there is one."""
+        now_s = time.monotonic()
+        with self._lock:
+            latest, freezes = self._latest, tuple(self._freezes)
+            if latest is None or now_s - latest.at_s <= OVERDUE_S:
+                return freezes
+            return (*freezes, Freeze(latest, now_s, age_now_ms(latest, self._now_s())))
 
     def _pictures(self) -> tuple[ShownPicture, ...]:
         with self._lock:

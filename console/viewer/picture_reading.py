@@ -54,6 +54,27 @@ class ShownPicture:
         return max(0.0, self.age_ms - (self.own_ms or 0.0))
 
 
+@dataclass(frozen=True, slots=True)
+class Freeze:
+    """A picture that has left the screen later than OVERDUE_S after it was shown.
+
+    Args:
+        picture: which.
+        until_s: when the next one was shown, or none any more, on `time.monotonic()`.
+        age_ms: of the picture at that moment.
+    """
+
+    picture: ShownPicture
+    until_s: float
+    age_ms: float
+
+    def age_at_ms(self, at_s: float) -> float:
+        """Returns the age of the picture at a moment of the freeze, in ms."""
+        if at_s >= self.until_s:
+            return self.age_ms
+        return self.picture.age_ms + (at_s - self.picture.at_s) * _MS_PER_S
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PictureReading:
     """Figures of the picture on the screen; each is None while it is unknown.

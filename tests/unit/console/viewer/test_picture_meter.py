@@ -109,6 +109,37 @@ def test_a_frozen_picture_is_reported_with_its_age_now(played: Played) -> None:
     assert report.picture_age_ms == 60_000
 
 
+def test_a_freeze_that_has_ended_counts_with_the_age_at_its_end(played: Played) -> None:
+    """Both pictures were young when they were shown; what the driver saw in between was not."""
+    played.show(20)
+    played.now_s += 0.9
+    played.show(30)
+    played.now_s += 0.05
+    assert played.meter.worst_ms(0.5) == pytest.approx(920, abs=1)
+    summary, report = played.meter.summary(), played.meter.report()
+    assert summary
+    assert report
+    assert (summary.median_ms, summary.worst_ms) == (25.0, 920.0)
+    assert (report.picture_age_ms, report.link_age_ms) == (920, 30)
+    played.now_s += 0.05
+    played.show(40)
+    second = played.meter.report()
+    assert second
+    assert second.picture_age_ms == 40, "each freeze is reported once"
+    played.now_s += 0.5
+    assert played.meter.worst_ms(0.3) == pytest.approx(540, abs=1)
+
+
+def test_a_picture_that_goes_after_a_freeze_counts_with_the_age_at_its_end(played: Played) -> None:
+    played.show(20)
+    played.now_s += 0.4
+    played.meter.forget()
+    played.now_s += 5.0
+    summary = played.meter.summary()
+    assert summary
+    assert summary.worst_ms == 420.0
+
+
 def test_a_picture_of_before_a_suspend_is_older_by_it(
     played: Played, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -157,14 +188,29 @@ def test_two_viewers_have_two_names(played: Played) -> None:
 def test_the_history_has_the_largest_age_of_each_half_second(played: Played) -> None:
     for age_ms in (20, 90, 30):
         played.show(age_ms)
+    played.meter.forget()
     played.now_s += 1.0
     played.show(40)
     history = played.meter.history()
     assert len(history) == HISTORY_SLOTS
     assert history[-3:] == [pytest.approx(90, abs=1e-3), None, pytest.approx(40, abs=1e-3)]
     assert set(history[:-3]) == {None}
+    played.meter.forget()
     played.now_s += 1000.0
     assert set(played.meter.history()) == {None}
+
+
+def test_the_history_rises_while_a_picture_stands_still(played: Played) -> None:
+    played.show(20)
+    played.now_s += 1.25
+    standing = [pytest.approx(each, abs=1e-3) for each in (520, 1020, 1270)]
+    assert played.meter.history()[-3:] == standing
+    played.show(30)
+    assert played.meter.history()[-3:] == standing, "and has risen when the next one comes"
+    played.now_s += 0.5
+    assert played.meter.history()[-1] == pytest.approx(530, abs=1e-3)
+    played.now_s += 1000.0
+    assert None not in played.meter.history()
 
 
 def test_the_worst_age_of_a_moment_has_short_peaks_and_what_is_frozen(played: Played) -> None:
@@ -172,8 +218,9 @@ def test_the_worst_age_of_a_moment_has_short_peaks_and_what_is_frozen(played: Pl
     for age_ms in (300, 20, 90, 30):
         played.show(age_ms)
         played.now_s += 0.2
-    assert played.meter.worst_ms(0.5) == pytest.approx(230, abs=1), "30 ms old 0.2 s ago, and no newer one"
-    assert played.meter.worst_ms(0.9) == pytest.approx(300, abs=1e-3)
+    assert played.meter.worst_ms(0.3) == pytest.approx(290, abs=1), "90 ms old, and 0.2 s on the screen"
+    assert played.meter.worst_ms(0.1) == pytest.approx(230, abs=1), "30 ms old 0.2 s ago, and no newer one"
+    assert played.meter.worst_ms(0.9) == pytest.approx(500, abs=1)
     played.meter.forget()
     assert played.meter.worst_ms(0.5) is None
 
