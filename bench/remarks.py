@@ -29,7 +29,7 @@ REMARKS: Final[Mapping[tuple[str, ...], str]] = {
     ),
     ("drive.cpu",): (
         "a bar on the value itself, on two slow cores. Driven, the program takes 50 commands a second (the"
-        " gateway drops the copies of the second lane), publishes 50, and sends its guard 50 heartbeats."
+        " gateway drops the copies of the other lanes), publishes 50, and sends its guard 50 heartbeats."
     ),
     ("drive.false_stops_very_lossy",): (
         "a packet that is lost, and whose repetition is lost as well, holds up a lane for longer than the"

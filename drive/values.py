@@ -96,7 +96,7 @@ class Command:
     """A driver's command.
 
     Attributes:
-        sequence: grows with each command of a session; a command on two lanes has one sequence.
+        sequence: grows with each command of a session; a command on several lanes has one sequence.
         held: whether the driver holds the control that makes the robot run.
         valid_until_ns: no motion by it afterwards.
         echo_ns: the newest instant of the robot's clock that the driver has received.

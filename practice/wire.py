@@ -6,6 +6,7 @@ from typing import Final
 
 from common.version import project_version
 from console.client import results
+from console.client.drive_lanes import LANES
 from console.client.mapping.reader import read
 from drive.machine import Rules, State
 from drive.values import MS, ZERO, Command, Lease, Supervision, Velocity
@@ -55,6 +56,7 @@ def opened(session_id: str, rules: Rules) -> results.DriveOpened:
     return results.DriveOpened(
         session_id=session_id,
         run_id=NAME,
+        max_lanes=LANES,
         limits=results.DriveLimits(
             max_vx_mps=limits.vx_mps,
             max_vy_mps=limits.vy_mps,

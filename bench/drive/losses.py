@@ -1,4 +1,4 @@
-"""Driving over a link that loses packets, by two lanes and by one, in turns over the same link.
+"""Driving over a link that loses packets, by all lanes and by one, in turns over the same link.
 
 The age of the newest command is taken whenever the robot makes a state, on its clock, which is also that of
 the driver's program here. A stop without need is another phase than driving while the driver holds.
@@ -12,6 +12,7 @@ from typing import Final
 from bench.drive.ground import Ground, driver, link
 from bench.progress import log
 from bench.rows import FEWEST_ROUNDS, Row
+from console.client.drive_lanes import LANES
 
 ROUNDS: Final = FEWEST_ROUNDS
 ROUND_S: Final = 120.0
@@ -35,16 +36,16 @@ class Drive:
 
 
 def rows(ground: Ground, wanted: set[str]) -> list[Row]:
-    two: list[Drive] = []
+    all_lanes: list[Drive] = []
     one: list[Drive] = []
     made = []
     if wanted - {"drive.false_stops_very_lossy"}:
         for seed in range(1, ROUNDS + 1):
-            two.append(drive(ground, LOSS, 2, ROUND_S, seed))
+            all_lanes.append(drive(ground, LOSS, LANES, ROUND_S, seed))
             one.append(drive(ground, LOSS, 1, ROUND_S, seed))
-        made += _lossy_rows(two, one)
+        made += _lossy_rows(all_lanes, one)
     if "drive.false_stops_very_lossy" in wanted:
-        much = [drive(ground, MUCH_LOSS, 2, ROUND_S, seed) for seed in range(1, ROUNDS + 1)]
+        much = [drive(ground, MUCH_LOSS, LANES, ROUND_S, seed) for seed in range(1, ROUNDS + 1)]
         made.append(_very_lossy_row(much))
     return [row for row in made if row.name in wanted]
 
@@ -68,14 +69,14 @@ def drive(ground: Ground, loss: float, lanes: int, seconds: float, seed: int) ->
     return found
 
 
-def _lossy_rows(two: list[Drive], one: list[Drive]) -> list[Row]:
+def _lossy_rows(all_lanes: list[Drive], one: list[Drive]) -> list[Row]:
     link_text = f"{LOSS:.0%} loss both ways, round trip 20 ms"
     return [
         Row(
             name="drive.false_stops",
             what=f"{link_text}: stops without need in {ROUND_S:.0f} s",
             unit="",
-            values=[each.stops for each in two],
+            values=[each.stops for each in all_lanes],
             bar=0,
             judged="worst",
         ),
@@ -90,7 +91,7 @@ def _lossy_rows(two: list[Drive], one: list[Drive]) -> list[Row]:
             name="drive.command_p99_ms",
             what=f"{link_text}: age of the newest command at the robot, 99th percentile, against one lane",
             unit="ms",
-            values=[each.p99_ms for each in two],
+            values=[each.p99_ms for each in all_lanes],
             references=[each.p99_ms for each in one],
             bar=0.6,
         ),

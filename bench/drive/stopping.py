@@ -106,7 +106,7 @@ FAULTS: Final[Mapping[str, _Fault]] = {
     "client_killed": _Fault("the driver's program is killed", _signal_driver(signal.SIGKILL), 100),
     "client_frozen": _Fault("the driver's program is frozen", _signal_driver(signal.SIGSTOP), 280),
     "cable_cut": _Fault("the network is cut, round trip 20 ms", _cut, 280, over="a link"),
-    "lanes_silent": _Fault("both lanes fall silent and stay open", _fall_silent, 280, over="a relay"),
+    "lanes_silent": _Fault("all lanes fall silent and stay open", _fall_silent, 280, over="a relay"),
     "downlink": _Fault("the way to the driver is cut, round trip 20 ms", _lose_answers, 450, over="a link"),
     "gateway_killed": _Fault("the gateway is killed", _signal_gateway(signal.SIGKILL), 60),
     "gateway_frozen": _Fault("the gateway is frozen", _signal_gateway(signal.SIGSTOP), 280),

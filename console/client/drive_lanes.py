@@ -20,7 +20,11 @@ MAX_UNACKNOWLEDGED: Final = 10
 MAX_UNANSWERED: Final = 100
 """Commands on one lane since its last state: it has stood still for 2 s. What it holds must not come as more
 at once than the gateway takes (200)."""
-LANES: Final = 2
+LANES: Final = 3
+"""Of a session, unless the gateway takes fewer. A lost packet holds a lane up; all at once are held up for
+longer than a command is valid every half hour on a link that loses 10 %, two of two every minute."""
+_LANES_UNSAID: Final = 2
+"""What a gateway takes that does not say."""
 _ALL_OPEN_S: Final = 2.5
 """How long the opening waits for all lanes: a lost first packet of a connection comes again after 1 s, and
 when that is lost, too, in another attempt (RFC 6298 2.1)."""
@@ -131,6 +135,7 @@ class Lanes:
         self._keepers: list[asyncio.Task[None]] = []
         self._written: list[OnTheirWay] = []
         """Of the open lanes."""
+        self._count = LANES
         self.open_count = 0
 
     async def open_first(self) -> None:
@@ -146,9 +151,9 @@ class Lanes:
 
         One alone stands still whenever a packet is lost, and stops the robot without need.
         """
-        for _ in range(1, LANES):
+        for _ in range(1, self._count):
             self._start_keeping(None)
-        await self._changes.wait_until(lambda: self.open_count == LANES or self._lost, _ALL_OPEN_S)
+        await self._changes.wait_until(lambda: self.open_count == self._count or self._lost, _ALL_OPEN_S)
 
     def send(self, command: Outgoing) -> None:
         """Sends a command on every lane; one that a lane has not written yet is skipped there."""
@@ -191,6 +196,7 @@ class Lanes:
             raise
         if isinstance(opened, DriveOpened):
             self._session_id = opened.session_id
+            self._count = min(LANES, opened.max_lanes or _LANES_UNSAID)
             self._user.opened(opened)
         return transport, lane
 

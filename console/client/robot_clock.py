@@ -15,7 +15,7 @@ KEPT_S: Final = 1.0
 """How long a bound counts: longer than any silence that the robot lets a driver go on after (400 ms), and so
 short that two quartz clocks differ by less than 0.2 ms."""
 _MOST: Final = 128
-"""Bounds kept, for three times as many states as both lanes bring within KEPT_S."""
+"""Bounds kept, for twice as many states as all lanes bring within KEPT_S."""
 _NS_PER_S: Final = 1_000_000_000
 
 

@@ -40,6 +40,7 @@ from gateway.status.values import Received, Velocity
 from gateway.teleop.episodes import Episodes
 from gateway.teleop.lane import DriveFacts, Driving, Lane
 from gateway.teleop.lease import (
+    MAX_LANES,
     Answer,
     Demand,
     Driver,
@@ -154,7 +155,7 @@ class Teleop:
             ) from None
         except TooManyLanesError:
             raise TooMuchError(
-                "this session has two lanes; close one first", Reason.TOO_MANY_STREAMS
+                f"this session has {MAX_LANES} lanes; close one first", Reason.TOO_MANY_STREAMS
             ) from None
         assert self._driving is not None  # noqa: S101  # it belongs to the holder
         return Lane(self, self._driving, number)

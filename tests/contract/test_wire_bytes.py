@@ -538,8 +538,13 @@ ADDITIONS = [
     Case(teleop_pb2.DriveResponse, sub(2, uint(1, 5)), {"state": teleop_pb2.DriveState(monotonic_ns=5)}),
     Case(
         teleop_pb2.DriveOpened,
-        text(1, "session") + text(2, "run") + sub(3, flt(1, 0.25)),
-        {"session_id": "session", "run_id": "run", "limits": teleop_pb2.DriveLimits(max_vx_mps=0.25)},
+        text(1, "session") + text(2, "run") + sub(3, flt(1, 0.25)) + uint(4, 3),
+        {
+            "session_id": "session",
+            "run_id": "run",
+            "limits": teleop_pb2.DriveLimits(max_vx_mps=0.25),
+            "max_lanes": 3,
+        },
     ),
     Case(
         teleop_pb2.DriveLimits,

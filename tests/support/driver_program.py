@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager
 from subprocess import Popen
 from typing import Final
 
-from console.client import AsyncGatewayClient, DriveOptions, DrivePhase, Supervision
+from console.client import AsyncGatewayClient, DriveOptions, DrivePhase, Supervision, drive_lanes
 from tests.support.lost_worker import ready_after_a_loss
 from tests.support.module_program import module_program
 
@@ -39,7 +39,7 @@ async def drive(target: str) -> None:
             holds += 1
             moves = session.state is not None and session.state.phase is DrivePhase.DRIVING
             steady = steady + 1 if moves else 0
-            if not said and steady >= _STEADY and session.open_lanes == 2:
+            if not said and steady >= _STEADY and session.open_lanes == drive_lanes.LANES:
                 said = True
                 print("driving", flush=True)
             await asyncio.sleep(0.02)

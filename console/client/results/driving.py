@@ -92,6 +92,8 @@ class DriveOpened:
     session_id: str
     run_id: str
     limits: DriveLimits
+    max_lanes: int
+    """Of the session; 0 from a gateway of before there were three."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

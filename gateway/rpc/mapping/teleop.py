@@ -8,6 +8,7 @@ from gateway.status.freshness import age_ms
 from gateway.status.teleop import DriveLimits, StopLatch, TeleopView
 from gateway.status.values import Velocity
 from gateway.teleop.lane import DriveFacts
+from gateway.teleop.lease import MAX_LANES
 from omniseer.gateway.v1 import system_status_pb2
 from omniseer.gateway.v1 import teleop_pb2 as pb
 
@@ -62,7 +63,9 @@ def opened(
         limits: what the robot accepts.
         line_of_sight: whether driving without a picture is permitted.
     """
-    message = pb.DriveResponse(opened=pb.DriveOpened(session_id=session_id, run_id=run_id))
+    message = pb.DriveResponse(
+        opened=pb.DriveOpened(session_id=session_id, run_id=run_id, max_lanes=MAX_LANES)
+    )
     if limits:
         values = {name: getattr(limits, name) for name in DriveLimits.__slots__}
         message.opened.limits.CopyFrom(pb.DriveLimits(**values, line_of_sight=line_of_sight))

@@ -107,7 +107,7 @@ async def test_a_stop_reaches_the_base_in_150_ms_with_3_percent_loss(
 async def test_3_percent_loss_stops_nothing_and_no_old_command_passes(
     robot: DrivenRobot, link: TcpLink
 ) -> None:
-    """The short form of the ten minutes in bench/drive. The two lanes race all the time."""
+    """The short form of the ten minutes in bench/drive. The lanes race all the time."""
 
     async def false_stops() -> float:
         link.impair(loss=LOSS, delay_s=ONE_WAY_S)

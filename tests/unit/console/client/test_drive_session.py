@@ -52,6 +52,7 @@ class Robot:
         self.answers = True
         self.ends_with: Refused | None = None
         self.opens_with: Refused | None = None
+        self.max_lanes = LANES
         self.refused = 0
         self.lanes: list[PlayedLane] = []
         self.commands: list[teleop_pb2.DriveCommand] = []
@@ -110,7 +111,9 @@ class PlayedLane:
                 self._robot.refused += 1
                 raise self._robot.opens_with
             self._opened = True
-            return DriveOpened(session_id="a session", run_id="a run", limits=LIMITS)
+            return DriveOpened(
+                session_id="a session", run_id="a run", limits=LIMITS, max_lanes=self._robot.max_lanes
+            )
         while True:
             if self._robot.ends_with:
                 raise self._robot.ends_with
@@ -292,14 +295,25 @@ async def test_a_lane_that_an_overloaded_robot_refuses_does_not_end_the_session(
     """It has no room for another connection now, or takes the lane that was lost for open still."""
     robot = Robot()
     async with driving(robot) as session:
-        robot.opens_with = Overloaded("this session has two lanes")
+        robot.opens_with = Overloaded("this session has three lanes")
         robot.lanes[-1].lost = True
         await until(lambda: robot.refused >= 2, "the lane is refused, and tried again")
         holds = await more_commands(robot, 10, partial(session.hold, SPEED_MPS))
         assert holds[-5:] == [True] * 5
-        assert (session.open_lanes, session.error) == (1, None)
+        assert (session.open_lanes, session.error) == (LANES - 1, None)
         robot.opens_with = None
         await until(lambda: session.open_lanes == LANES, "there is room again")
+
+
+@pytest.mark.parametrize(
+    ("max_lanes", "opened"), [(0, 2), (1, 1), (2, 2), (LANES, LANES), (LANES + 1, LANES)]
+)
+async def test_a_session_has_as_many_lanes_as_both_sides_take(max_lanes: int, opened: int) -> None:
+    """0: a gateway of before there were three, which takes two."""
+    robot = Robot()
+    robot.max_lanes = max_lanes
+    async with driving(robot) as session:
+        assert (session.open_lanes, len(robot.lanes)) == (opened, opened)
 
 
 async def test_a_picture_that_raises_ends_the_session_with_its_error_and_a_release() -> None:

@@ -100,7 +100,7 @@ def test_the_first_copy_of_a_command_counts() -> None:
     assert not lease.take(session, 1, 0.01, held=True)
     assert session.heard_s == 0.0
     assert lease.take(session, 3, 0.02, held=False)
-    assert not lease.take(session, 2, 0.03, held=True), "overtaken on the other lane"
+    assert not lease.take(session, 2, 0.03, held=True), "overtaken on another lane"
 
 
 def test_no_command_of_a_session_that_has_ended_counts() -> None:
@@ -120,7 +120,7 @@ def test_a_session_ends_with_its_last_lane() -> None:
     assert not lease.lane_gone(session, second, LeaseEnd.LOST), "once"
 
 
-def test_a_session_has_no_more_than_two_lanes() -> None:
+def test_a_session_has_no_more_than_its_lanes() -> None:
     lease = Lease()
     session = acquired(lease, ANNA)
     numbers = [lease.add_lane(session, 5.0) for _ in range(MAX_LANES)]
@@ -134,12 +134,13 @@ def test_a_lane_that_brings_nothing_makes_room_for_another() -> None:
     """As one whose connection vanished: its driver notices that before the gateway does."""
     lease = Lease()
     session = acquired(lease, ANNA)
-    vanished, other = lease.add_lane(session, 5.0), lease.add_lane(session, 5.0)
-    lease.lane_heard(session, other, 5.0 + LANE_SILENT_S - 0.01)
+    vanished, *others = (lease.add_lane(session, 5.0) for _ in range(MAX_LANES))
+    for other in others:
+        lease.lane_heard(session, other, 5.0 + LANE_SILENT_S - 0.01)
     with pytest.raises(TooManyLanesError):
         lease.add_lane(session, 5.0 + LANE_SILENT_S - 0.01)
     new = lease.add_lane(session, 5.0 + LANE_SILENT_S)
-    assert set(session.lanes) == {other, new}
+    assert set(session.lanes) == {*others, new}
     lease.lane_heard(session, vanished, 7.0)
     assert not lease.lane_gone(session, vanished, LeaseEnd.LOST), "the others are its lanes now"
     assert session.ended is None

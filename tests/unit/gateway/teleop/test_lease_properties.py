@@ -7,6 +7,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 from gateway.status.teleop import LeaseEnd
 from gateway.teleop.lease import (
     LANE_SILENT_S,
+    MAX_LANES,
     RELEASED_S,
     SILENCE_S,
     Demand,
@@ -65,7 +66,7 @@ class Driving(RuleBasedStateMachine):
         try:
             number = self.lease.add_lane(session, self.now_s)
         except TooManyLanesError:
-            assert len(session.lanes) == 2
+            assert len(session.lanes) == MAX_LANES
             assert all(self.now_s - heard_s < LANE_SILENT_S for heard_s in session.lanes.values())
         else:
             self.lanes.append((session, number))
@@ -110,7 +111,7 @@ class Driving(RuleBasedStateMachine):
     def a_holder_that_streams_has_a_lane(self) -> None:
         holder = self.lease.holder
         assert holder is None or holder.lanes or not holder.streaming
-        assert holder is None or len(holder.lanes) <= 2
+        assert holder is None or len(holder.lanes) <= MAX_LANES
 
 
 TestDriving = Driving.TestCase

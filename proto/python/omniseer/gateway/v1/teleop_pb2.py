@@ -26,7 +26,7 @@ from buf.validate import validate_pb2 as buf_dot_validate_dot_validate__pb2
 from omniseer.gateway.v1 import access_pb2 as omniseer_dot_gateway_dot_v1_dot_access__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n omniseer/gateway/v1/teleop.proto\x12\x13omniseer.gateway.v1\x1a\x1b\x62uf/validate/validate.proto\x1a omniseer/gateway/v1/access.proto\"\x7f\n\x0c\x44riveRequest\x12.\n\x04open\x18\x01 \x01(\x0b\x32\x1e.omniseer.gateway.v1.DriveOpenH\x00\x12\x34\n\x07\x63ommand\x18\x02 \x01(\x0b\x32!.omniseer.gateway.v1.DriveCommandH\x00\x42\t\n\x07message\"\x9a\x01\n\tDriveOpen\x12\x1c\n\x0b\x63lient_name\x18\x01 \x01(\tB\x07\xbaH\x04r\x02\x18@\x12\x11\n\ttake_over\x18\x02 \x01(\x08\x12\x1b\n\nsession_id\x18\x03 \x01(\tB\x07\xbaH\x04r\x02\x18@\x12?\n\x0bsupervision\x18\x04 \x01(\x0e\x32 .omniseer.gateway.v1.SupervisionB\x08\xbaH\x05\x82\x01\x02\x10\x01\"\xd1\x01\n\x0c\x44riveCommand\x12\x10\n\x08sequence\x18\x01 \x01(\x04\x12\x0c\n\x04held\x18\x02 \x01(\x08\x12\x0e\n\x06vx_mps\x18\x03 \x01(\x02\x12\x0e\n\x06vy_mps\x18\x04 \x01(\x02\x12\x10\n\x08wz_rad_s\x18\x05 \x01(\x02\x12\x19\n\x11\x65\x63ho_monotonic_ns\x18\x06 \x01(\x04\x12\x1c\n\x14picture_monotonic_ns\x18\x07 \x01(\x04\x12 \n\x18valid_until_monotonic_ns\x18\x08 \x01(\x04\x12\x14\n\x0cinput_device\x18\t \x01(\t\"\x80\x01\n\rDriveResponse\x12\x32\n\x06opened\x18\x01 \x01(\x0b\x32 .omniseer.gateway.v1.DriveOpenedH\x00\x12\x30\n\x05state\x18\x02 \x01(\x0b\x32\x1f.omniseer.gateway.v1.DriveStateH\x00\x42\t\n\x07message\"c\n\x0b\x44riveOpened\x12\x12\n\nsession_id\x18\x01 \x01(\t\x12\x0e\n\x06run_id\x18\x02 \x01(\t\x12\x30\n\x06limits\x18\x03 \x01(\x0b\x32 .omniseer.gateway.v1.DriveLimits\"\x88\x02\n\x0b\x44riveLimits\x12\x12\n\nmax_vx_mps\x18\x01 \x01(\x02\x12\x12\n\nmax_vy_mps\x18\x02 \x01(\x02\x12\x14\n\x0cmax_wz_rad_s\x18\x03 \x01(\x02\x12\x19\n\x11\x61\x63\x63\x65leration_mps2\x18\x04 \x01(\x02\x12\x1b\n\x13\x61\x63\x63\x65leration_rad_s2\x18\x05 \x01(\x02\x12\x1a\n\x12max_picture_age_ms\x18\x06 \x01(\r\x12\x18\n\x10picture_travel_m\x18\x07 \x01(\x02\x12\x15\n\rline_of_sight\x18\x08 \x01(\x08\x12\x19\n\x11line_of_sight_mps\x18\t \x01(\x02\x12\x1b\n\x13line_of_sight_rad_s\x18\n \x01(\x02\"\x88\x03\n\nDriveState\x12\x14\n\x0cmonotonic_ns\x18\x01 \x01(\x04\x12\x17\n\x0fnewest_sequence\x18\x02 \x01(\x04\x12.\n\x05phase\x18\x03 \x01(\x0e\x32\x1f.omniseer.gateway.v1.DrivePhase\x12\x33\n\x08inhibits\x18\x04 \x03(\x0e\x32!.omniseer.gateway.v1.DriveInhibit\x12\x0e\n\x06vx_mps\x18\x05 \x01(\x02\x12\x0e\n\x06vy_mps\x18\x06 \x01(\x02\x12\x10\n\x08wz_rad_s\x18\x07 \x01(\x02\x12\x16\n\x0e\x63ommand_age_ms\x18\x08 \x01(\r\x12\x13\n\x0bloop_age_ms\x18\t \x01(\r\x12\x1b\n\x0epicture_age_ms\x18\n \x01(\rH\x00\x88\x01\x01\x12\x17\n\x0fspeed_limit_mps\x18\x0b \x01(\x02\x12,\n\x04stop\x18\x0c \x01(\x0b\x32\x1e.omniseer.gateway.v1.StopLatch\x12\x10\n\x08problems\x18\r \x03(\tB\x11\n\x0f_picture_age_ms\"H\n\tStopLatch\x12\x0f\n\x07stop_id\x18\x01 \x01(\x04\x12\n\n\x02\x62y\x18\x02 \x01(\t\x12\x0e\n\x06reason\x18\x03 \x01(\t\x12\x0e\n\x06\x61ge_ms\x18\x04 \x01(\x04\"I\n\x10StopRobotRequest\x12\x18\n\x06reason\x18\x01 \x01(\tB\x08\xbaH\x05r\x03\x18\xc8\x01\x12\x1b\n\nrequest_id\x18\x02 \x01(\tB\x07\xbaH\x04r\x02\x18@\"R\n\x11StopRobotResponse\x12\x0f\n\x07message\x18\x01 \x01(\t\x12,\n\x04stop\x18\x02 \x01(\x0b\x32\x1e.omniseer.gateway.v1.StopLatch\"#\n\x10ResetStopRequest\x12\x0f\n\x07stop_id\x18\x01 \x01(\x04\"T\n\x11ResetStopResponse\x12\x0f\n\x07message\x18\x01 \x01(\t\x12.\n\x05phase\x18\x02 \x01(\x0e\x32\x1f.omniseer.gateway.v1.DrivePhase*b\n\x0bSupervision\x12\x1b\n\x17SUPERVISION_UNSPECIFIED\x10\x00\x12\x17\n\x13SUPERVISION_PICTURE\x10\x01\x12\x1d\n\x19SUPERVISION_LINE_OF_SIGHT\x10\x02*\xdc\x01\n\nDrivePhase\x12\x1b\n\x17\x44RIVE_PHASE_UNSPECIFIED\x10\x00\x12\x18\n\x14\x44RIVE_PHASE_DISABLED\x10\x01\x12\x19\n\x15\x44RIVE_PHASE_AVAILABLE\x10\x02\x12\x15\n\x11\x44RIVE_PHASE_ARMED\x10\x03\x12\x17\n\x13\x44RIVE_PHASE_DRIVING\x10\x04\x12\x18\n\x14\x44RIVE_PHASE_STOPPING\x10\x05\x12\x19\n\x15\x44RIVE_PHASE_INHIBITED\x10\x06\x12\x17\n\x13\x44RIVE_PHASE_STOPPED\x10\x07*\xc6\x02\n\x0c\x44riveInhibit\x12\x1d\n\x19\x44RIVE_INHIBIT_UNSPECIFIED\x10\x00\x12\x1e\n\x1a\x44RIVE_INHIBIT_COMMAND_LATE\x10\x01\x12\x1b\n\x17\x44RIVE_INHIBIT_LOOP_LATE\x10\x02\x12!\n\x1d\x44RIVE_INHIBIT_PICTURE_MISSING\x10\x03\x12\x1f\n\x1b\x44RIVE_INHIBIT_PICTURE_STALE\x10\x04\x12\x1c\n\x18\x44RIVE_INHIBIT_ROBOT_STOP\x10\x05\x12\x1d\n\x19\x44RIVE_INHIBIT_BASE_ABSENT\x10\x06\x12\x1b\n\x17\x44RIVE_INHIBIT_OUTRANKED\x10\x07\x12\x1c\n\x18\x44RIVE_INHIBIT_DRIVE_LOST\x10\x08\x12\x1e\n\x1a\x44RIVE_INHIBIT_ACCESS_ENDED\x10\t2\xad\x02\n\rTeleopService\x12X\n\x05\x44rive\x12!.omniseer.gateway.v1.DriveRequest\x1a\".omniseer.gateway.v1.DriveResponse\"\x04\x98\xb8\x18\x02(\x01\x30\x01\x12`\n\tStopRobot\x12%.omniseer.gateway.v1.StopRobotRequest\x1a&.omniseer.gateway.v1.StopRobotResponse\"\x04\x98\xb8\x18\x01\x12`\n\tResetStop\x12%.omniseer.gateway.v1.ResetStopRequest\x1a&.omniseer.gateway.v1.ResetStopResponse\"\x04\x98\xb8\x18\x02\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n omniseer/gateway/v1/teleop.proto\x12\x13omniseer.gateway.v1\x1a\x1b\x62uf/validate/validate.proto\x1a omniseer/gateway/v1/access.proto\"\x7f\n\x0c\x44riveRequest\x12.\n\x04open\x18\x01 \x01(\x0b\x32\x1e.omniseer.gateway.v1.DriveOpenH\x00\x12\x34\n\x07\x63ommand\x18\x02 \x01(\x0b\x32!.omniseer.gateway.v1.DriveCommandH\x00\x42\t\n\x07message\"\x9a\x01\n\tDriveOpen\x12\x1c\n\x0b\x63lient_name\x18\x01 \x01(\tB\x07\xbaH\x04r\x02\x18@\x12\x11\n\ttake_over\x18\x02 \x01(\x08\x12\x1b\n\nsession_id\x18\x03 \x01(\tB\x07\xbaH\x04r\x02\x18@\x12?\n\x0bsupervision\x18\x04 \x01(\x0e\x32 .omniseer.gateway.v1.SupervisionB\x08\xbaH\x05\x82\x01\x02\x10\x01\"\xd1\x01\n\x0c\x44riveCommand\x12\x10\n\x08sequence\x18\x01 \x01(\x04\x12\x0c\n\x04held\x18\x02 \x01(\x08\x12\x0e\n\x06vx_mps\x18\x03 \x01(\x02\x12\x0e\n\x06vy_mps\x18\x04 \x01(\x02\x12\x10\n\x08wz_rad_s\x18\x05 \x01(\x02\x12\x19\n\x11\x65\x63ho_monotonic_ns\x18\x06 \x01(\x04\x12\x1c\n\x14picture_monotonic_ns\x18\x07 \x01(\x04\x12 \n\x18valid_until_monotonic_ns\x18\x08 \x01(\x04\x12\x14\n\x0cinput_device\x18\t \x01(\t\"\x80\x01\n\rDriveResponse\x12\x32\n\x06opened\x18\x01 \x01(\x0b\x32 .omniseer.gateway.v1.DriveOpenedH\x00\x12\x30\n\x05state\x18\x02 \x01(\x0b\x32\x1f.omniseer.gateway.v1.DriveStateH\x00\x42\t\n\x07message\"v\n\x0b\x44riveOpened\x12\x12\n\nsession_id\x18\x01 \x01(\t\x12\x0e\n\x06run_id\x18\x02 \x01(\t\x12\x30\n\x06limits\x18\x03 \x01(\x0b\x32 .omniseer.gateway.v1.DriveLimits\x12\x11\n\tmax_lanes\x18\x04 \x01(\r\"\x88\x02\n\x0b\x44riveLimits\x12\x12\n\nmax_vx_mps\x18\x01 \x01(\x02\x12\x12\n\nmax_vy_mps\x18\x02 \x01(\x02\x12\x14\n\x0cmax_wz_rad_s\x18\x03 \x01(\x02\x12\x19\n\x11\x61\x63\x63\x65leration_mps2\x18\x04 \x01(\x02\x12\x1b\n\x13\x61\x63\x63\x65leration_rad_s2\x18\x05 \x01(\x02\x12\x1a\n\x12max_picture_age_ms\x18\x06 \x01(\r\x12\x18\n\x10picture_travel_m\x18\x07 \x01(\x02\x12\x15\n\rline_of_sight\x18\x08 \x01(\x08\x12\x19\n\x11line_of_sight_mps\x18\t \x01(\x02\x12\x1b\n\x13line_of_sight_rad_s\x18\n \x01(\x02\"\x88\x03\n\nDriveState\x12\x14\n\x0cmonotonic_ns\x18\x01 \x01(\x04\x12\x17\n\x0fnewest_sequence\x18\x02 \x01(\x04\x12.\n\x05phase\x18\x03 \x01(\x0e\x32\x1f.omniseer.gateway.v1.DrivePhase\x12\x33\n\x08inhibits\x18\x04 \x03(\x0e\x32!.omniseer.gateway.v1.DriveInhibit\x12\x0e\n\x06vx_mps\x18\x05 \x01(\x02\x12\x0e\n\x06vy_mps\x18\x06 \x01(\x02\x12\x10\n\x08wz_rad_s\x18\x07 \x01(\x02\x12\x16\n\x0e\x63ommand_age_ms\x18\x08 \x01(\r\x12\x13\n\x0bloop_age_ms\x18\t \x01(\r\x12\x1b\n\x0epicture_age_ms\x18\n \x01(\rH\x00\x88\x01\x01\x12\x17\n\x0fspeed_limit_mps\x18\x0b \x01(\x02\x12,\n\x04stop\x18\x0c \x01(\x0b\x32\x1e.omniseer.gateway.v1.StopLatch\x12\x10\n\x08problems\x18\r \x03(\tB\x11\n\x0f_picture_age_ms\"H\n\tStopLatch\x12\x0f\n\x07stop_id\x18\x01 \x01(\x04\x12\n\n\x02\x62y\x18\x02 \x01(\t\x12\x0e\n\x06reason\x18\x03 \x01(\t\x12\x0e\n\x06\x61ge_ms\x18\x04 \x01(\x04\"I\n\x10StopRobotRequest\x12\x18\n\x06reason\x18\x01 \x01(\tB\x08\xbaH\x05r\x03\x18\xc8\x01\x12\x1b\n\nrequest_id\x18\x02 \x01(\tB\x07\xbaH\x04r\x02\x18@\"R\n\x11StopRobotResponse\x12\x0f\n\x07message\x18\x01 \x01(\t\x12,\n\x04stop\x18\x02 \x01(\x0b\x32\x1e.omniseer.gateway.v1.StopLatch\"#\n\x10ResetStopRequest\x12\x0f\n\x07stop_id\x18\x01 \x01(\x04\"T\n\x11ResetStopResponse\x12\x0f\n\x07message\x18\x01 \x01(\t\x12.\n\x05phase\x18\x02 \x01(\x0e\x32\x1f.omniseer.gateway.v1.DrivePhase*b\n\x0bSupervision\x12\x1b\n\x17SUPERVISION_UNSPECIFIED\x10\x00\x12\x17\n\x13SUPERVISION_PICTURE\x10\x01\x12\x1d\n\x19SUPERVISION_LINE_OF_SIGHT\x10\x02*\xdc\x01\n\nDrivePhase\x12\x1b\n\x17\x44RIVE_PHASE_UNSPECIFIED\x10\x00\x12\x18\n\x14\x44RIVE_PHASE_DISABLED\x10\x01\x12\x19\n\x15\x44RIVE_PHASE_AVAILABLE\x10\x02\x12\x15\n\x11\x44RIVE_PHASE_ARMED\x10\x03\x12\x17\n\x13\x44RIVE_PHASE_DRIVING\x10\x04\x12\x18\n\x14\x44RIVE_PHASE_STOPPING\x10\x05\x12\x19\n\x15\x44RIVE_PHASE_INHIBITED\x10\x06\x12\x17\n\x13\x44RIVE_PHASE_STOPPED\x10\x07*\xc6\x02\n\x0c\x44riveInhibit\x12\x1d\n\x19\x44RIVE_INHIBIT_UNSPECIFIED\x10\x00\x12\x1e\n\x1a\x44RIVE_INHIBIT_COMMAND_LATE\x10\x01\x12\x1b\n\x17\x44RIVE_INHIBIT_LOOP_LATE\x10\x02\x12!\n\x1d\x44RIVE_INHIBIT_PICTURE_MISSING\x10\x03\x12\x1f\n\x1b\x44RIVE_INHIBIT_PICTURE_STALE\x10\x04\x12\x1c\n\x18\x44RIVE_INHIBIT_ROBOT_STOP\x10\x05\x12\x1d\n\x19\x44RIVE_INHIBIT_BASE_ABSENT\x10\x06\x12\x1b\n\x17\x44RIVE_INHIBIT_OUTRANKED\x10\x07\x12\x1c\n\x18\x44RIVE_INHIBIT_DRIVE_LOST\x10\x08\x12\x1e\n\x1a\x44RIVE_INHIBIT_ACCESS_ENDED\x10\t2\xad\x02\n\rTeleopService\x12X\n\x05\x44rive\x12!.omniseer.gateway.v1.DriveRequest\x1a\".omniseer.gateway.v1.DriveResponse\"\x04\x98\xb8\x18\x02(\x01\x30\x01\x12`\n\tStopRobot\x12%.omniseer.gateway.v1.StopRobotRequest\x1a&.omniseer.gateway.v1.StopRobotResponse\"\x04\x98\xb8\x18\x01\x12`\n\tResetStop\x12%.omniseer.gateway.v1.ResetStopRequest\x1a&.omniseer.gateway.v1.ResetStopResponse\"\x04\x98\xb8\x18\x02\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -49,12 +49,12 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_TELEOPSERVICE'].methods_by_name['StopRobot']._serialized_options = b'\230\270\030\001'
   _globals['_TELEOPSERVICE'].methods_by_name['ResetStop']._loaded_options = None
   _globals['_TELEOPSERVICE'].methods_by_name['ResetStop']._serialized_options = b'\230\270\030\002'
-  _globals['_SUPERVISION']._serialized_start=1868
-  _globals['_SUPERVISION']._serialized_end=1966
-  _globals['_DRIVEPHASE']._serialized_start=1969
-  _globals['_DRIVEPHASE']._serialized_end=2189
-  _globals['_DRIVEINHIBIT']._serialized_start=2192
-  _globals['_DRIVEINHIBIT']._serialized_end=2518
+  _globals['_SUPERVISION']._serialized_start=1887
+  _globals['_SUPERVISION']._serialized_end=1985
+  _globals['_DRIVEPHASE']._serialized_start=1988
+  _globals['_DRIVEPHASE']._serialized_end=2208
+  _globals['_DRIVEINHIBIT']._serialized_start=2211
+  _globals['_DRIVEINHIBIT']._serialized_end=2537
   _globals['_DRIVEREQUEST']._serialized_start=120
   _globals['_DRIVEREQUEST']._serialized_end=247
   _globals['_DRIVEOPEN']._serialized_start=250
@@ -64,21 +64,21 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_DRIVERESPONSE']._serialized_start=619
   _globals['_DRIVERESPONSE']._serialized_end=747
   _globals['_DRIVEOPENED']._serialized_start=749
-  _globals['_DRIVEOPENED']._serialized_end=848
-  _globals['_DRIVELIMITS']._serialized_start=851
-  _globals['_DRIVELIMITS']._serialized_end=1115
-  _globals['_DRIVESTATE']._serialized_start=1118
-  _globals['_DRIVESTATE']._serialized_end=1510
-  _globals['_STOPLATCH']._serialized_start=1512
-  _globals['_STOPLATCH']._serialized_end=1584
-  _globals['_STOPROBOTREQUEST']._serialized_start=1586
-  _globals['_STOPROBOTREQUEST']._serialized_end=1659
-  _globals['_STOPROBOTRESPONSE']._serialized_start=1661
-  _globals['_STOPROBOTRESPONSE']._serialized_end=1743
-  _globals['_RESETSTOPREQUEST']._serialized_start=1745
-  _globals['_RESETSTOPREQUEST']._serialized_end=1780
-  _globals['_RESETSTOPRESPONSE']._serialized_start=1782
-  _globals['_RESETSTOPRESPONSE']._serialized_end=1866
-  _globals['_TELEOPSERVICE']._serialized_start=2521
-  _globals['_TELEOPSERVICE']._serialized_end=2822
+  _globals['_DRIVEOPENED']._serialized_end=867
+  _globals['_DRIVELIMITS']._serialized_start=870
+  _globals['_DRIVELIMITS']._serialized_end=1134
+  _globals['_DRIVESTATE']._serialized_start=1137
+  _globals['_DRIVESTATE']._serialized_end=1529
+  _globals['_STOPLATCH']._serialized_start=1531
+  _globals['_STOPLATCH']._serialized_end=1603
+  _globals['_STOPROBOTREQUEST']._serialized_start=1605
+  _globals['_STOPROBOTREQUEST']._serialized_end=1678
+  _globals['_STOPROBOTRESPONSE']._serialized_start=1680
+  _globals['_STOPROBOTRESPONSE']._serialized_end=1762
+  _globals['_RESETSTOPREQUEST']._serialized_start=1764
+  _globals['_RESETSTOPREQUEST']._serialized_end=1799
+  _globals['_RESETSTOPRESPONSE']._serialized_start=1801
+  _globals['_RESETSTOPRESPONSE']._serialized_end=1885
+  _globals['_TELEOPSERVICE']._serialized_start=2540
+  _globals['_TELEOPSERVICE']._serialized_end=2841
 # @@protoc_insertion_point(module_scope)

@@ -188,9 +188,9 @@ class DriveOpen(_message.Message):
     held for 2 s, and to administrators at any time.
     """
     session_id: _builtins.str
-    """Empty for a new session; for its second lane the ID that DriveOpened has returned."""
+    """Empty for a new session; for its other lanes the ID that DriveOpened has returned."""
     supervision: Global___Supervision.ValueType
-    """How the driver sees the robot. Ignored on a second lane."""
+    """How the driver sees the robot. Ignored on the other lanes."""
     def __init__(
         self,
         *,
@@ -223,7 +223,7 @@ class DriveCommand(_message.Message):
     VALID_UNTIL_MONOTONIC_NS_FIELD_NUMBER: _builtins.int
     INPUT_DEVICE_FIELD_NUMBER: _builtins.int
     sequence: _builtins.int
-    """Grows by one with each command of the session. The same on both lanes."""
+    """Grows by one with each command of the session. The same on all lanes."""
     held: _builtins.bool
     """Whether the driver holds the control that makes the robot run. Velocities count only while it is true."""
     vx_mps: _builtins.float
@@ -309,10 +309,13 @@ class DriveOpened(_message.Message):
     SESSION_ID_FIELD_NUMBER: _builtins.int
     RUN_ID_FIELD_NUMBER: _builtins.int
     LIMITS_FIELD_NUMBER: _builtins.int
+    MAX_LANES_FIELD_NUMBER: _builtins.int
     session_id: _builtins.str
     """Names the session; never used again."""
     run_id: _builtins.str
     """As in GatewayFacts: changes when the gateway was started again."""
+    max_lanes: _builtins.int
+    """How many lanes the session may have. 0 from a gateway older than this field, which takes two."""
     @_builtins.property
     def limits(self) -> Global___DriveLimits:
         """What the robot accepts. Faster commands are slowed down, all components by one factor."""
@@ -323,10 +326,11 @@ class DriveOpened(_message.Message):
         session_id: _builtins.str = ...,
         run_id: _builtins.str = ...,
         limits: Global___DriveLimits | None = ...,
+        max_lanes: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["limits", b"limits"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["limits", b"limits", "run_id", b"run_id", "session_id", b"session_id"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["limits", b"limits", "max_lanes", b"max_lanes", "run_id", b"run_id", "session_id", b"session_id"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -412,7 +416,7 @@ class DriveState(_message.Message):
     monotonic_ns: _builtins.int
     """The monotonic clock of Ping when this was sent, in ns. Commands echo the newest."""
     newest_sequence: _builtins.int
-    """The newest command of the session that has arrived, on either lane."""
+    """The newest command of the session that has arrived, on any lane."""
     phase: Global___DrivePhase.ValueType
     """Phase of driving."""
     vx_mps: _builtins.float

@@ -69,9 +69,10 @@ class TeleopServiceServicer:
     def Drive(self, request_iterator, context):
         """One lane of a driver's session: commands to the robot, states from it.
 
-        A driver opens one lane or, so that the loss of a packet on one connection delays nothing, two lanes on two
-        connections, with the session's ID of the first lane in the second. Each command is sent on both; the copy
-        that arrives first counts. The session ends with its last lane, or after 2 s without a command.
+        A driver opens one lane or, so that the loss of a packet on one connection delays nothing, several lanes on as
+        many connections (DriveOpened.max_lanes), with the session's ID of the first lane in the others. Each command
+        is sent on all; the copy that arrives first counts. The session ends with its last lane, or after 2 s without
+        a command.
 
         The first request opens the lane, all others are commands: 10 to 60 a second, whether the driver holds or
         not. The robot sends its state 20 times a second and on each change.
@@ -80,8 +81,8 @@ class TeleopServiceServicer:
         FAILED_PRECONDITION: the robot is not set up for driving, driving is or was disabled, or supervision by line
         of sight is not permitted.
         ABORTED: another driver has the lease (see take_over) or took it, or the session has ended.
-        RESOURCE_EXHAUSTED: more than 200 commands a second on one lane, or more than two lanes (one that has
-        brought nothing for 1 s makes room for another).
+        RESOURCE_EXHAUSTED: more than 200 commands a second on one lane, or more than DriveOpened.max_lanes (one that
+        has brought nothing for 1 s makes room for another).
         UNAVAILABLE: the robot's drive program has not answered since the gateway was started.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)

@@ -42,9 +42,10 @@ class TeleopServiceStub:
     Drive: _grpc.StreamStreamMultiCallable[_teleop_pb2.DriveRequest, _teleop_pb2.DriveResponse]
     """One lane of a driver's session: commands to the robot, states from it.
 
-    A driver opens one lane or, so that the loss of a packet on one connection delays nothing, two lanes on two
-    connections, with the session's ID of the first lane in the second. Each command is sent on both; the copy
-    that arrives first counts. The session ends with its last lane, or after 2 s without a command.
+    A driver opens one lane or, so that the loss of a packet on one connection delays nothing, several lanes on as
+    many connections (DriveOpened.max_lanes), with the session's ID of the first lane in the others. Each command
+    is sent on all; the copy that arrives first counts. The session ends with its last lane, or after 2 s without
+    a command.
 
     The first request opens the lane, all others are commands: 10 to 60 a second, whether the driver holds or
     not. The robot sends its state 20 times a second and on each change.
@@ -53,8 +54,8 @@ class TeleopServiceStub:
     FAILED_PRECONDITION: the robot is not set up for driving, driving is or was disabled, or supervision by line
     of sight is not permitted.
     ABORTED: another driver has the lease (see take_over) or took it, or the session has ended.
-    RESOURCE_EXHAUSTED: more than 200 commands a second on one lane, or more than two lanes (one that has
-    brought nothing for 1 s makes room for another).
+    RESOURCE_EXHAUSTED: more than 200 commands a second on one lane, or more than DriveOpened.max_lanes (one that
+    has brought nothing for 1 s makes room for another).
     UNAVAILABLE: the robot's drive program has not answered since the gateway was started.
     """
     StopRobot: _grpc.UnaryUnaryMultiCallable[_teleop_pb2.StopRobotRequest, _teleop_pb2.StopRobotResponse]
@@ -91,9 +92,10 @@ class TeleopServiceAsyncStub(TeleopServiceStub):
     Drive: _aio.StreamStreamMultiCallable[_teleop_pb2.DriveRequest, _teleop_pb2.DriveResponse]  # type: ignore[assignment]
     """One lane of a driver's session: commands to the robot, states from it.
 
-    A driver opens one lane or, so that the loss of a packet on one connection delays nothing, two lanes on two
-    connections, with the session's ID of the first lane in the second. Each command is sent on both; the copy
-    that arrives first counts. The session ends with its last lane, or after 2 s without a command.
+    A driver opens one lane or, so that the loss of a packet on one connection delays nothing, several lanes on as
+    many connections (DriveOpened.max_lanes), with the session's ID of the first lane in the others. Each command
+    is sent on all; the copy that arrives first counts. The session ends with its last lane, or after 2 s without
+    a command.
 
     The first request opens the lane, all others are commands: 10 to 60 a second, whether the driver holds or
     not. The robot sends its state 20 times a second and on each change.
@@ -102,8 +104,8 @@ class TeleopServiceAsyncStub(TeleopServiceStub):
     FAILED_PRECONDITION: the robot is not set up for driving, driving is or was disabled, or supervision by line
     of sight is not permitted.
     ABORTED: another driver has the lease (see take_over) or took it, or the session has ended.
-    RESOURCE_EXHAUSTED: more than 200 commands a second on one lane, or more than two lanes (one that has
-    brought nothing for 1 s makes room for another).
+    RESOURCE_EXHAUSTED: more than 200 commands a second on one lane, or more than DriveOpened.max_lanes (one that
+    has brought nothing for 1 s makes room for another).
     UNAVAILABLE: the robot's drive program has not answered since the gateway was started.
     """
     StopRobot: _aio.UnaryUnaryMultiCallable[_teleop_pb2.StopRobotRequest, _teleop_pb2.StopRobotResponse]  # type: ignore[assignment]
@@ -143,9 +145,10 @@ class TeleopServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_abc.Iterator[_teleop_pb2.DriveResponse], _abc.AsyncIterator[_teleop_pb2.DriveResponse]]:
         """One lane of a driver's session: commands to the robot, states from it.
 
-        A driver opens one lane or, so that the loss of a packet on one connection delays nothing, two lanes on two
-        connections, with the session's ID of the first lane in the second. Each command is sent on both; the copy
-        that arrives first counts. The session ends with its last lane, or after 2 s without a command.
+        A driver opens one lane or, so that the loss of a packet on one connection delays nothing, several lanes on as
+        many connections (DriveOpened.max_lanes), with the session's ID of the first lane in the others. Each command
+        is sent on all; the copy that arrives first counts. The session ends with its last lane, or after 2 s without
+        a command.
 
         The first request opens the lane, all others are commands: 10 to 60 a second, whether the driver holds or
         not. The robot sends its state 20 times a second and on each change.
@@ -154,8 +157,8 @@ class TeleopServiceServicer(metaclass=_abc_1.ABCMeta):
         FAILED_PRECONDITION: the robot is not set up for driving, driving is or was disabled, or supervision by line
         of sight is not permitted.
         ABORTED: another driver has the lease (see take_over) or took it, or the session has ended.
-        RESOURCE_EXHAUSTED: more than 200 commands a second on one lane, or more than two lanes (one that has
-        brought nothing for 1 s makes room for another).
+        RESOURCE_EXHAUSTED: more than 200 commands a second on one lane, or more than DriveOpened.max_lanes (one that
+        has brought nothing for 1 s makes room for another).
         UNAVAILABLE: the robot's drive program has not answered since the gateway was started.
         """
 
