@@ -8,8 +8,10 @@ from bench.siege.ground import own_ground
 from bench.siege.judgement import REVOCATION_S
 from bench.siege.rounds import Outcome, besiege
 from bench.siege.size import SMALL
+from gateway.config import LimitSettings
 from gateway.rpc.connections.admission import MAX_PENDING
 from gateway.rpc.connections.shedding import BURST
+from gateway.rpc.server import CALLS_BESIDE_STREAMS
 
 pytestmark = [pytest.mark.timed, pytest.mark.alone]
 
@@ -18,7 +20,7 @@ CONNECTION_KIB = 64
 to 53 here, with what those cost that are cut off and come back."""
 CALL_KIB = 25
 """What a call costs whose refusal is delayed (gateway/rpc/connections/refusal_delay.py)."""
-CALLS = 256
+CALLS = LimitSettings().streams_per_connection + CALLS_BESIDE_STREAMS
 """That a connection may have open."""
 
 
