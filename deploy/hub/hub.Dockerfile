@@ -38,6 +38,8 @@ RUN .cache/tools/bin/python -m hatchling build -t wheel \
  && .venv/bin/robot-bridge hub --help > /dev/null
 
 FROM system
+# What is in the image, for a look at advisories: package and version, one line each.
+RUN dpkg-query --show --showformat '${Package} ${Version}\n' > /usr/share/robot-gateway-packages.txt
 COPY --from=built /opt/robot-gateway/.venv /opt/robot-gateway/.venv
 RUN install -d -m 0700 -o 10021 -g 10021 /tmp
 ENV PATH=/opt/robot-gateway/.venv/bin:$PATH \

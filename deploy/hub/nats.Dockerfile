@@ -8,6 +8,8 @@ RUN groupadd --gid 10020 nats \
  && useradd --uid 10020 --gid 10020 --no-create-home --shell /usr/sbin/nologin nats \
  && install -d -m 0700 -o 10020 -g 10020 /var/lib/nats \
  && install -d -m 0755 /etc/nats
+# What is in the image, for a look at advisories: package and version, one line each.
+RUN dpkg-query --show --showformat '${Package} ${Version}\n' > /usr/share/robot-gateway-packages.txt
 COPY --chmod=0755 healthy /usr/local/bin/healthy
 HEALTHCHECK --interval=5s --timeout=3s --start-period=30s --retries=3 CMD ["healthy"]
 ENTRYPOINT ["nats-server", "--config", "/etc/nats/nats.conf"]
@@ -23,5 +25,7 @@ WORKDIR /tmp/package
 RUN apt-get update && apt-get download nats-server && dpkg --extract nats-server_*.deb .
 
 FROM base AS debian
+RUN --mount=type=bind,from=packaged,source=/tmp/package,target=/tmp/package \
+    dpkg-deb --show --showformat '${Package} ${Version}\n' /tmp/package/*.deb >> /usr/share/robot-gateway-packages.txt
 COPY --from=packaged /tmp/package/usr/sbin/nats-server /usr/sbin/nats-server
 USER 10020:10020

@@ -50,6 +50,20 @@ def test_each_package_is_listed_with_its_version() -> None:
     assert versions["robot-preview", "gstreamer1.0-plugins-bad"] == inside
 
 
+@pytest.mark.usefixtures("images")
+@pytest.mark.parametrize(("image", "package"), [("robot-hub", "tini"), ("robot-hub-nats", "libc6")])
+def test_the_hubs_images_list_their_packages_with_versions(image: str, package: str) -> None:
+    listed = docker(
+        "run", "--rm", "--network=none", "--entrypoint=cat", f"{image}:{TAG}",
+        "/usr/share/robot-gateway-packages.txt",
+    )  # fmt: skip
+    inside = docker(
+        "run", "--rm", "--network=none", "--entrypoint=dpkg-query", f"{image}:{TAG}",
+        "--show", "--showformat=${Version}", package,
+    )  # fmt: skip
+    assert f"{package} {inside}" in listed.splitlines()
+
+
 def build(image: str) -> None:
     """Builds an image on Debian's, which the others share, with a layer and a command of its own."""
     dockerfile = f'FROM debian:bookworm-slim\nRUN echo {image} > /name\nCMD ["cat", "/name"]\n'
