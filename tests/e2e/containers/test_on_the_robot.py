@@ -134,6 +134,13 @@ def test_nodes_of_another_user_reach_the_operator_and_the_recorder(
             begun = robotctl_process("--target", deployment.target, "record", "start", "--json")
             assert begun.returncode == 0, begun.stderr
             status_with(operator, messages_are_written, "messages are recorded", 30)
+            for program in ("gateway", "recorder"):
+                asked = deployment.run(
+                    "exec", "-T", program, f"robot-{program}", "doctor", "--json", check=False
+                )
+                findings = json.loads(asked.stdout)["findings"]
+                assert "ros.transport" in {each["check"] for each in findings}, asked.stdout
+                assert [each for each in findings if each["verdict"] == "wrong"] == [], asked.stderr
 
 
 @pytest.mark.usefixtures("images")
