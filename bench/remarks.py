@@ -103,6 +103,11 @@ OLDER: Final = (
         " since then are not comparable with these.",
     ),
     Older(
+        ("drive.false_stops*", "drive.command_p99_ms"),
+        frozenset({"648d6af8"}),
+        "measured with two lanes, against one where a row compares. Since commit 11d38fb6 a session has three.",
+    ),
+    Older(
         ("siege.*",),
         frozenset({"86c63e59"}),
         "measured with attackers from new addresses in the first turn alone, and `siege.p99` judged by"
