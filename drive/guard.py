@@ -184,13 +184,12 @@ class Guard:
     def _follow(self, heartbeats: socket.socket, watch: Watch, pid: int) -> str:
         """Reads heartbeats until they end (empty) or the worker has to be killed; returns why, for people.
 
-        Zeros go out until the first, where a driver had the robot before.
+        Where a driver had the robot before, zeros go out until the worker has taken over.
         """
         reach = ReachSaid(heartbeats)
         while True:
             wait_s = max(0.0, (watch.deadline_ns - time.monotonic_ns()) / 1e9)
-            if not watch.began:
-                wait_s = min(wait_s, self._publish_zero())
+            wait_s = min(wait_s, self._publish_zero())
             self._heartbeats.send()
             if _is_readable(heartbeats, min(wait_s, _LONGEST_WAIT_S)):
                 beat = _received(heartbeats)
@@ -214,12 +213,26 @@ class Guard:
                 self._heartbeats.ready()
             self._served = True
             self._backoff.reset()
-            self._zeros_until_ns = 0
+        if self._zeros_until_ns:
+            self._judge_takeover(actual, first=not watch.began)
         watch.beat(time.monotonic_ns(), leased=actual.phase not in RESTING_PHASES)
         stop = actual.stop
         latch = Latch(stop.stop_id, stop.by, stop.reason) if actual.HasField("stop") else None
         self._stops = replace(self._stops, last_id=max(self._stops.last_id, stop.stop_id), latch=latch)
         self._keep_episode(episode_of(actual))
+
+    def _judge_takeover(self, actual: pb.ActualState, *, first: bool) -> None:
+        """Ends the zeros once the worker's velocities reach what they reach, or other velocities are due.
+
+        To discover the multiplexer may take the worker longer than the multiplexer remembers an input;
+        another source would move a stopped robot then. A subscription that died may count here for longer
+        than for the worker, until the middleware drops it: beside the worker's own zeros these do no harm.
+        """
+        due = actual.phase == pb.PHASE_DRIVING or actual.phase in RESTING_PHASES
+        if due or actual.matched >= self._velocities.matched():
+            self._zeros_until_ns = 0
+        elif first:
+            _log.warning("the new worker's velocities do not arrive yet: the zeros of the guard go on")
 
     def _keep_episode(self, episode: Episode | None) -> None:
         """Keeps the stops, and the episode once it has ended, until a gateway has recorded it."""

@@ -166,14 +166,15 @@ def actual_state(
     return message
 
 
-def heartbeat(state: State, episode: Episode | None) -> pb.ActualState:
+def heartbeat(state: State, episode: Episode | None, matched: int) -> pb.ActualState:
     """Returns what the guard needs of the report of a state: it comes 50 times a second.
 
     Args:
         state: of the machine.
         episode: the newest.
+        matched: how many subscriptions take the velocities.
     """
-    message = pb.ActualState(phase=PHASES[state.phase])
+    message = pb.ActualState(phase=PHASES[state.phase], matched=matched)
     _add_what_is_kept(message, state, episode)
     return message
 

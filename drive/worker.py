@@ -99,6 +99,8 @@ class Worker:
         self._heartbeats = heartbeats
         self._reach = ReachHeard(heartbeats)
         self._guard_problem = ""
+        self._matched = 0
+        """How many subscriptions took the velocities when last observed."""
         self._rules = rules
         self._state = state
         self._revision = 0
@@ -210,7 +212,8 @@ class Worker:
 
     def _surroundings(self, now_ns: int) -> Surroundings:
         observed = self._base.observed(now_ns)
-        guarded = self._reach.reaches(self._base.matched() if observed.base_present else 0, now_ns)
+        self._matched = self._base.matched()
+        guarded = self._reach.reaches(self._matched if observed.base_present else 0, now_ns)
         self._guard_problem = _NOT_GUARDED if observed.base_present and not guarded else ""
         age_ns = now_ns - self._picture_ns
         return replace(
@@ -264,7 +267,7 @@ class Worker:
 
     def _beat(self, now_ns: int) -> None:
         try:
-            beat = wire.heartbeat(self._state, self._episode)
+            beat = wire.heartbeat(self._state, self._episode, self._matched)
             self._heartbeats.send(beat.SerializeToString(), socket.MSG_DONTWAIT)
         except BlockingIOError:
             self._judge_guard(now_ns)

@@ -25,10 +25,11 @@ BEATS = """
 import os, signal, socket, sys, time
 from omniseer.drive.v1 import drive_pb2 as pb
 started, then = sys.argv[1], sys.argv[2]
+later = os.path.exists(started)
 def begin():
     with open(started, "a") as file:
         file.write(str(os.getpid()) + "\\n")
-if then == "crash" and os.path.exists(started):
+if then == "crash" and later:
     begin()
     sys.exit(3)
 beats = socket.socket(fileno=int(os.environ["DRIVE_HEARTBEATS"]))
@@ -36,10 +37,13 @@ if then == "ignore":
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
 episode = pb.Episode(episode_id=3, holder="anna", started_ns=1, distance_m=0.5)
 phase = pb.PHASE_AVAILABLE if then == "rest" else pb.PHASE_DRIVING
+if later and then.startswith("PHASE_"):
+    phase = pb.Phase.Value(then)
 for number in range(1_000_000):
     if number == 20 or then == "garbage":
         begin()
-    state = pb.ActualState(phase=phase, episode=episode)
+    matched = int(os.path.exists(started + ".matched"))
+    state = pb.ActualState(phase=phase, episode=episode, matched=matched)
     beats.send(b"\\xff\\xff" if then == "garbage" else state.SerializeToString())
     if then == "listen":
         try:
@@ -129,6 +133,34 @@ def test_a_lost_worker_means_zeros_until_the_next_one_has_the_robot(
         assert max(b - a for a, b in pairwise(zeros)) < 0.5
     latch = read_stops(running.stop_file).latch
     assert latch is None or latch.by == "robot-drive"
+
+
+def test_zeros_go_on_until_the_next_workers_velocities_arrive(tmp_path: Path) -> None:
+    with guarding(tmp_path, "PHASE_STOPPED") as running:
+        os.kill(running.worker(), signal.SIGKILL)
+        running.worker(2)
+        zeros = running.zeros.at_s
+        before = len(zeros)
+        wait_until(lambda: len(zeros) > before + 100, "zeros beside the next worker's heartbeats")
+        (tmp_path / "started.matched").touch()
+        wait_until(lambda: time.monotonic() - zeros[-1] > 0.5, "the end of the zeros")
+
+
+@pytest.mark.parametrize(
+    ("phase", "takers"),
+    [
+        pytest.param("PHASE_DRIVING", 1, id="it drives"),
+        pytest.param("PHASE_AVAILABLE", 1, id="others have the robot"),
+        pytest.param("PHASE_STOPPED", 0, id="nothing takes zeros"),
+    ],
+)
+def test_zeros_end_where_none_are_due_or_none_arrive(tmp_path: Path, phase: str, takers: int) -> None:
+    with guarding(tmp_path, phase) as running:
+        running.zeros.takers = takers
+        os.kill(running.worker(), signal.SIGKILL)
+        running.worker(2)
+        zeros = running.zeros.at_s
+        wait_until(lambda: zeros and time.monotonic() - zeros[-1] > 0.5, "the end of the zeros")
 
 
 def test_a_silent_worker_is_killed_and_the_log_says_what_it_waited_for(

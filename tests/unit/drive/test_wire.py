@@ -106,8 +106,8 @@ def test_the_welcome_has_the_limits_in_effect() -> None:
 
 def test_a_heartbeat_has_what_the_guard_keeps() -> None:
     latch, episode = Latch(4, "ben", "a child"), Episode(3, "anna", 10, 20, 0.5, 0.25, "released")
-    beat = heartbeat(State(phase=Phase.STOPPED, latch=latch), episode)
-    assert beat.phase == PHASES[Phase.STOPPED]
+    beat = heartbeat(State(phase=Phase.STOPPED, latch=latch), episode, 2)
+    assert (beat.phase, beat.matched) == (PHASES[Phase.STOPPED], 2)
     assert (beat.stop.stop_id, beat.stop.by, beat.stop.reason) == (4, "ben", "a child")
     assert episode_of(beat) == episode
-    assert not heartbeat(State(phase=Phase.ARMED), None).HasField("stop")
+    assert not heartbeat(State(phase=Phase.ARMED), None, 0).HasField("stop")

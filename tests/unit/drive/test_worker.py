@@ -368,6 +368,13 @@ def test_without_a_driver_a_frozen_guard_ends_nothing(world: World) -> None:
         world.worker.run()
 
 
+def test_the_guard_knows_how_many_take_the_velocities(world: World) -> None:
+    world.surroundings = Surroundings(base_present=False)
+    world.end(210)
+    world.worker.run()
+    assert {beat.matched for beat in world.beats()} == {1}
+
+
 def test_nothing_moves_before_the_guard_reaches_the_base(world: World) -> None:
     world.guard_says.clear()
     world.drives()

@@ -628,6 +628,7 @@ class ActualState(_message.Message):
     EPISODE_FIELD_NUMBER: _builtins.int
     PROBLEMS_FIELD_NUMBER: _builtins.int
     RESET_OBSTACLE_FIELD_NUMBER: _builtins.int
+    MATCHED_FIELD_NUMBER: _builtins.int
     monotonic_ns: _builtins.int
     """The instant."""
     applied_revision: _builtins.int
@@ -650,6 +651,8 @@ class ActualState(_message.Message):
     """Speed limit by the picture's age, in m/s."""
     reset_obstacle: _builtins.str
     """What keeps the stop from being reset, for people. Empty when nothing does, and without a stop."""
+    matched: _builtins.int
+    """How many subscriptions take the worker's velocities. In heartbeats to the guard alone."""
     @_builtins.property
     def inhibits(self) -> _containers.RepeatedScalarFieldContainer[Global___Inhibit.ValueType]:
         """Why nothing moves."""
@@ -689,10 +692,11 @@ class ActualState(_message.Message):
         episode: Global___Episode | None = ...,
         problems: _abc.Iterable[_builtins.str] | None = ...,
         reset_obstacle: _builtins.str = ...,
+        matched: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["counters", b"counters", "episode", b"episode", "stop", b"stop"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["applied_revision", b"applied_revision", "command_ns", b"command_ns", "counters", b"counters", "episode", b"episode", "inhibits", b"inhibits", "monotonic_ns", b"monotonic_ns", "newest_sequence", b"newest_sequence", "phase", b"phase", "problems", b"problems", "reset_obstacle", b"reset_obstacle", "session_id", b"session_id", "speed_limit_mps", b"speed_limit_mps", "stop", b"stop", "vx_mps", b"vx_mps", "vy_mps", b"vy_mps", "wz_rad_s", b"wz_rad_s"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["applied_revision", b"applied_revision", "command_ns", b"command_ns", "counters", b"counters", "episode", b"episode", "inhibits", b"inhibits", "matched", b"matched", "monotonic_ns", b"monotonic_ns", "newest_sequence", b"newest_sequence", "phase", b"phase", "problems", b"problems", "reset_obstacle", b"reset_obstacle", "session_id", b"session_id", "speed_limit_mps", b"speed_limit_mps", "stop", b"stop", "vx_mps", b"vx_mps", "vy_mps", b"vy_mps", "wz_rad_s", b"wz_rad_s"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
