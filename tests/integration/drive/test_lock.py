@@ -1,0 +1,43 @@
+"""The lock of a stop, at the double of twist_mux: what it silences."""
+
+import time
+
+import pytest
+
+from tests.support.driving import Driving
+from tests.support.promise import MS, keeps
+from tests.support.waiting import wait_until
+
+pytestmark = [pytest.mark.ros, pytest.mark.timed]
+
+
+def test_a_stop_silences_a_source_of_higher_priority(robot: Driving) -> None:
+    """No zero passes such a source; until the reset nothing at all passes the lock."""
+
+    def silenced_after_ms() -> float:
+        peer = robot.ready()
+        try:
+            with robot.same_worker():
+                since_ns = time.monotonic_ns()
+                robot.robot.change(commander="unseen", speed_mps=0.2, turn_rad_s=0)
+                wait_until(lambda: robot.witness.motion_since(since_ns), "the source has the robot")
+                stopped_ns = time.monotonic_ns()
+                peer.send(stop="ben")
+                robot.phase_is("STOPPED")
+                robot.settled()
+                heard = len(robot.witness.seen)
+                wait_until(lambda: not robot.state().reset_obstacle, "nothing has moved the base for 3 s")
+                assert len(robot.witness.seen) == heard, "the base hears nothing"
+                last_ns = max(robot.witness.motion_since(stopped_ns), default=stopped_ns)
+                peer.send(reset=robot.state().stop.stop_id)
+                robot.phase_is("AVAILABLE")
+                reset_ns = time.monotonic_ns()
+                wait_until(lambda: robot.witness.motion_since(reset_ns), "the source has the robot again")
+                robot.robot.change(commander="nobody", speed_mps=0.0)
+                peer.send(lease="anna", held=False)
+                wait_until(lambda: not robot.witness.moves(), "zeros arrive again")
+        finally:
+            robot.robot.change(commander="nobody", speed_mps=0.0)
+        return (last_ns - stopped_ns) / 1e6
+
+    keeps(400, "stop of a source of higher priority, ms", silenced_after_ms, per_stalled_s=MS)
