@@ -42,7 +42,7 @@ def serve(settings: DriveSettings, config_file: Path | None) -> int:
     stop_file = StopFile(path)
     use_udp(settings.state_dir)
     with ros_node(OwnNode.DRIVE_GUARD) as node:
-        velocities = VelocityPublisher(node, settings.outputs, lock_topic=None)
+        velocities = VelocityPublisher(node, settings.outputs)
         guard = Guard(command, velocities, settings.on_loss, stop_file, read_stops(path))
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, lambda *_: guard.stop())

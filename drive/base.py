@@ -8,6 +8,7 @@ from rclpy.duration import Duration
 
 from common.ros_node import OWN_NODES, OwnNode, message_class, ros_node
 from drive.config import DriveSettings, Output
+from drive.lock import Lock
 from drive.other_sources import OtherSources
 from drive.outranking import Outranking
 from drive.stop_input import stop_inputs
@@ -49,30 +50,22 @@ class _Output:
 
 
 class VelocityPublisher:
-    """Publishes velocities and the lock. Used by the worker, and by the guard when the worker is gone.
+    """Publishes velocities. Used by the worker, and by the guard when the worker is gone.
 
     Args:
         node: of rclpy.
         outputs: inputs of the robot's multiplexer.
-        lock_topic: None if it can't be locked.
     """
 
-    def __init__(self, node: Any, outputs: Sequence[Output], lock_topic: str | None) -> None:
+    def __init__(self, node: Any, outputs: Sequence[Output]) -> None:
         self._clock = node.get_clock()
         self._outputs = [_Output(node, output) for output in outputs]
-        self._lock_type = message_class("std_msgs/msg/Bool")
-        self._lock = node.create_publisher(self._lock_type, lock_topic, NEWEST) if lock_topic else None
 
     def publish(self, velocity: Velocity) -> None:
         """Publishes a velocity on all outputs, stamped now: some controllers reject by the stamp's age."""
         stamp = self._clock.now().to_msg()
         for output in self._outputs:
             output.publish(velocity, stamp)
-
-    def lock(self, *, active: bool) -> None:
-        """Locks or unlocks the multiplexer, where it can be."""
-        if self._lock:
-            self._lock.publish(self._lock_type(data=active))
 
     def matched(self) -> int:
         """Returns how many subscriptions take the velocities, observers included."""
@@ -88,7 +81,8 @@ class Base:
     """What the graph says about the base, and the publisher of its velocities."""
 
     def __init__(self, node: Any, settings: DriveSettings) -> None:
-        self._velocities = VelocityPublisher(node, settings.outputs, settings.lock_topic)
+        self._velocities = VelocityPublisher(node, settings.outputs)
+        self._lock = Lock(node, settings.lock_topic) if settings.lock_topic else None
         self._takers = Takers(
             node,
             self._velocities,
@@ -121,8 +115,9 @@ class Base:
             self._outranking.published(velocity, now_ns)
 
     def lock(self, *, active: bool) -> None:
-        """Locks or unlocks the multiplexer, where it can be."""
-        self._velocities.lock(active=active)
+        """Locks or unlocks the multiplexer, where it can be and no other program may hold it."""
+        if self._lock:
+            self._lock.publish(active=active)
 
     def matched(self) -> int:
         """Returns how many subscriptions take the velocities, observers included."""
@@ -134,12 +129,15 @@ class Base:
 
     def problems(self) -> list[str]:
         """Returns what was missing when last observed, for people."""
-        return [*self._problems, *(stop.problem for stop in self._stops if stop.problem)]
+        problems = [*self._problems, *(stop.problem for stop in self._stops)]
+        return list(filter(None, [*problems, self._lock.problem if self._lock else ""]))
 
     def observed(self, now_ns: int) -> Surroundings:
         """Takes what has arrived; returns what it says. The preview's part is the gateway's to say."""
         self._take_mux_output(now_ns)
         self._take_odometry(now_ns)
+        if self._lock:
+            self._lock.observe(now_ns)
         self._problems = self._takers.problems(now_ns)
         fresh = self._still is not None and now_ns - self._still[0] <= _ODOMETRY_NS
         return Surroundings(

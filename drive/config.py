@@ -8,7 +8,7 @@ from typing import Annotated, Final, Literal
 from pydantic import Field
 from pydantic_settings import SettingsConfigDict
 
-from common.config import Section, Settings
+from common.config import Section, Settings, SettingsConflictError
 from common.socket_path import SocketPath
 from drive.inhibits import Deadlines
 from drive.machine import OnLoss, Rules
@@ -106,6 +106,16 @@ class DriveSettings(Settings):
     a person resets the stop (hold), or other sources of commands have it again (hand_back)."""
     state_dir: Path = Field(default_factory=_default_state_dir)
     """Keeps a stop over a restart; made this user's own."""
+
+    def check(self) -> None:
+        """Raises a `SettingsConflictError` where values are valid each, but not together."""
+        if self.lock_topic in self.stop_topics:
+            raise SettingsConflictError(
+                ("stop_topics", self.stop_topics.index(self.lock_topic)),
+                f"stop_topics lists {self.lock_topic}, which is lock_topic: robot-drive publishes there "
+                "itself, and could not tell the robot's own stop from its own lock",
+                "Give the stop button and the lock of robot-drive a topic each",
+            )
 
     @property
     def stop_path(self) -> Path:

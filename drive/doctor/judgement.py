@@ -91,11 +91,11 @@ def _lock(topic: TopicFacts) -> Finding:
             "Add the lock to the multiplexer, or set lock_topic to null",
         )
     if topic.publishers:
-        return note(
+        return wrong(
             "mux.lock",
             f"{', '.join(topic.publishers)} publishes the lock on {topic.name}, too",
-            "The reset of a stop would release a lock that is not ours",
-            "Give robot-drive a lock of its own, with the same priority",
+            "After the reset of a stop the robot stays locked until that releases it: it might be its lock",
+            "Give robot-drive a lock of its own in the multiplexer, of the same priority, and set lock_topic",
         )
     return good("mux.lock", f"{topic.name} is taken by {', '.join(topic.subscribers)}")
 

@@ -52,7 +52,7 @@ class _Pulse:
     def __init__(
         self, node: Any, settings: DriveSettings, permission: Permission, doctor: socket.socket
     ) -> None:
-        self._velocities = VelocityPublisher(node, settings.outputs, lock_topic=None)
+        self._velocities = VelocityPublisher(node, settings.outputs)
         self._odometry = (
             subscribe(node, "nav_msgs/msg/Odometry", settings.odometry) if settings.odometry else None
         )

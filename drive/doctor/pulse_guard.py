@@ -43,7 +43,7 @@ def guarded_pulse(node: Any, settings: DriveSettings, config_file: Path | None) 
         settings: of the drive program.
         config_file: that they come from.
     """
-    velocities = VelocityPublisher(node, settings.outputs, lock_topic=None)
+    velocities = VelocityPublisher(node, settings.outputs)
     command = [sys.executable, "-m", "drive.cli", "pulse"]
     if config_file:
         command += ["--config", str(config_file)]

@@ -1,11 +1,15 @@
-"""The lock of a stop, at the double of twist_mux: what it silences."""
+"""The lock of a stop, at the double of twist_mux: what it silences, and when it is released."""
 
 import time
+from collections.abc import Callable
 
 import pytest
 
+from common.ros_node import message_class, ros_node
+from drive.config import DriveSettings
 from tests.support.driving import Driving
 from tests.support.promise import MS, keeps
+from tests.support.undisturbed import undisturbed
 from tests.support.waiting import wait_until
 
 pytestmark = [pytest.mark.ros, pytest.mark.timed]
@@ -41,3 +45,40 @@ def test_a_stop_silences_a_source_of_higher_priority(robot: Driving) -> None:
         return (last_ns - stopped_ns) / 1e6
 
     keeps(400, "stop of a source of higher priority, ms", silenced_after_ms, per_stalled_s=MS)
+
+
+def test_a_reset_releases_no_lock_that_another_program_may_hold(robot: Driving) -> None:
+    boolean, topic = message_class("std_msgs/msg/Bool"), DriveSettings().lock_topic
+
+    def says(text: str) -> Callable[[], bool]:
+        return lambda: text in " ".join(robot.state().problems)
+
+    def attempt() -> None:
+        peer = robot.ready()
+        try:
+            with robot.same_worker(), ros_node("button") as button:
+                publisher = button.create_publisher(boolean, topic, 1)
+
+                def is_released() -> bool:
+                    publisher.publish(boolean(data=False))
+                    return not robot.state().problems
+
+                peer.send(stop="ben")
+                robot.phase_is("STOPPED")
+                wait_until(says(f"button publishes the lock on {topic}, too"), "it is said before a reset")
+                wait_until(lambda: not robot.state().reset_obstacle, "it may be reset")
+                publisher.publish(boolean(data=True))
+                peer.send(reset=robot.state().stop.stop_id)
+                robot.phase_is("AVAILABLE")
+                wait_until(says(f"the lock on {topic} is active"), "the lock that is left is named")
+                assert says("(button)")()
+                robot.robot.change(commander="autonomy", speed_mps=0.2, turn_rad_s=0)
+                since_ns = time.monotonic_ns()
+                wait_until(lambda: robot.state().monotonic_ns > since_ns + 1_000_000_000, "a second")
+                assert not robot.witness.motion_since(since_ns)
+                wait_until(is_released, "the button releases it")
+                wait_until(lambda: robot.witness.motion_since(since_ns), "autonomy has the robot")
+        finally:
+            robot.robot.change(commander="nobody", speed_mps=0.0)
+
+    undisturbed(attempt)

@@ -28,7 +28,7 @@ def publishing() -> Iterator[tuple[VelocityPublisher, dict[str, Any]]]:
     """A publisher of all outputs, and the subscriptions that take them."""
     with ros_node("publisher") as publisher, ros_node("subscriber") as subscriber:
         taking = {each.topic: subscribe(subscriber, each.type, each.topic, NEWEST) for each in OUTPUTS}
-        velocities = VelocityPublisher(publisher, OUTPUTS, lock_topic=None)
+        velocities = VelocityPublisher(publisher, OUTPUTS)
         wait_until(lambda: velocities.matched() == len(OUTPUTS), "all are matched")
         yield velocities, taking
 

@@ -1,10 +1,14 @@
 """Settings of the drive program: deadlines may be shortened and not prolonged, and nothing is infinite."""
 
+import json
+from pathlib import Path
 from typing import Any
 
 import pytest
 from pydantic import ValidationError
 
+from common.config import load
+from common.errors import UserError
 from drive.config import DriveSettings
 from drive.machine import OnLoss, Rules
 
@@ -53,3 +57,13 @@ def test_what_a_robot_without_a_mux_sets() -> None:
     assert rules.on_loss is OnLoss.HAND_BACK
     assert rules.limits.wheel_mps == 0
     assert rules.deadlines.command_ns == 100_000_000
+
+
+def test_the_lock_is_no_stop_of_the_robots_own(tmp_path: Path) -> None:
+    config = tmp_path / "drive.yaml"
+    config.write_text(json.dumps({"stop_topics": ["/button", "/lock"], "lock_topic": "/lock"}))
+    with pytest.raises(UserError, match="stop_topics lists /lock, which is lock_topic") as error:
+        load(DriveSettings, config)
+    assert error.value.remedy == "Give the stop button and the lock of robot-drive a topic each"
+    config.write_text(json.dumps({"stop_topics": ["/button"], "lock_topic": None}))
+    assert load(DriveSettings, config).lock_topic is None

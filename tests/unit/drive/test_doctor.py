@@ -61,7 +61,7 @@ def test_a_good_robot_has_nothing_to_mend() -> None:
             Verdict.NOTE,
             "nothing takes the lock",
         ),
-        (replace(GOOD, lock=replace(LOCK, publishers=("button",))), "mux.lock", Verdict.NOTE, "button"),
+        (replace(GOOD, lock=replace(LOCK, publishers=("button",))), "mux.lock", Verdict.WRONG, "button"),
         (replace(GOOD, mux_output=None), "base", Verdict.NOTE, "mux_output is not set"),
         (replace(GOOD, mux_output=replace(REACHING, subscribers=())), "base", Verdict.WRONG, "no base"),
         (
