@@ -1,7 +1,7 @@
 """From a driver's velocity to the one that is published: limits, age of the picture, acceleration. Pure."""
 
 from dataclasses import dataclass
-from math import copysign, inf
+from math import copysign, hypot, inf
 
 from drive.values import ZERO, Supervision, Velocity
 
@@ -71,14 +71,26 @@ def supervised_limit_mps(supervision: Supervision, picture_age_s: float, limits:
 def approached(current: Velocity, target: Velocity, elapsed_s: float, limits: Limits) -> Velocity:
     """Returns the velocity on the way from `current` to `target` after `elapsed_s`.
 
-    Each component slows down at once and speeds up at the limit; through a reversal it passes zero. It never
+    Each component slows down at once; through a reversal it passes zero. What speeds up does so by one
+    factor: each at a limit of its own, the shorter ones would arrive first and bend the way there. It never
     overshoots its target.
     """
-    linear, angular = limits.acceleration_mps2 * elapsed_s, limits.acceleration_rad_s2 * elapsed_s
+    start = Velocity(
+        _slowed(current.vx_mps, target.vx_mps),
+        _slowed(current.vy_mps, target.vy_mps),
+        _slowed(current.wz_rad_s, target.wz_rad_s),
+    )
+    linear_mps = hypot(target.vx_mps - start.vx_mps, target.vy_mps - start.vy_mps)
+    factor = min(
+        _factor(linear_mps, limits.acceleration_mps2 * elapsed_s),
+        _factor(target.wz_rad_s - start.wz_rad_s, limits.acceleration_rad_s2 * elapsed_s),
+    )
+    if factor == 1.0:
+        return target
     return Velocity(
-        _component(current.vx_mps, target.vx_mps, linear),
-        _component(current.vy_mps, target.vy_mps, linear),
-        _component(current.wz_rad_s, target.wz_rad_s, angular),
+        _grown(start.vx_mps, target.vx_mps, factor),
+        _grown(start.vy_mps, target.vy_mps, factor),
+        _grown(start.wz_rad_s, target.wz_rad_s, factor),
     )
 
 
@@ -96,9 +108,13 @@ def _factor(value: float, limit: float) -> float:
     return 1.0 if magnitude <= limit else limit / magnitude
 
 
-def _component(current: float, target: float, step: float) -> float:
+def _slowed(current: float, target: float) -> float:
+    """Returns what a component has at once."""
     if current * target < 0:
-        current = 0.0
-    if abs(target) <= abs(current):
-        return target
-    return copysign(min(abs(target), abs(current) + step), target)
+        return 0.0
+    return target if abs(target) <= abs(current) else current
+
+
+def _grown(start: float, target: float, factor: float) -> float:
+    """Returns a component by this factor on its way; rounding takes it no farther than its target."""
+    return copysign(min(abs(target), abs(start + factor * (target - start))), target)

@@ -1,9 +1,12 @@
 """Whatever happens in whatever order: when the robot may move, and how fast."""
 
-from dataclasses import replace
+from dataclasses import astuple, replace
+from itertools import combinations
+from math import hypot
 from typing import Any
 
-from hypothesis import given, settings
+import pytest
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
 
@@ -409,3 +412,35 @@ def test_an_approach_never_overshoots(current: Velocity, target: Velocity, elaps
         assert reached * wanted >= 0
         if getattr(current, name) * wanted < 0:
             assert abs(reached) <= 1.6 * elapsed_s + 1e-9, "from zero on"
+
+
+@given(velocities, velocities, st.floats(0, 1))
+@example(ZERO, Velocity(0.2, 0.05), 0.02)
+@example(Velocity(0.1, 0.1), Velocity(0.3, -0.1, 0.4), 0.02)
+def test_an_approach_speeds_up_in_the_direction_of_its_change(
+    current: Velocity, target: Velocity, elapsed_s: float
+) -> None:
+    limits = Limits()
+    after = approached(current, target, elapsed_s, limits)
+    grown, missing = [], []
+    for now, reached, wanted in zip(astuple(current), astuple(after), astuple(target), strict=True):
+        slower = wanted if abs(wanted) <= abs(now) else now
+        at_once = 0.0 if now * wanted < 0 else slower
+        grown.append(reached - at_once)
+        missing.append(wanted - at_once)
+    for one, other in combinations(range(3), 2):
+        assert abs(grown[one] * missing[other] - grown[other] * missing[one]) < 1e-9
+    assert hypot(*grown[:2]) <= limits.acceleration_mps2 * elapsed_s + 1e-9
+    assert abs(grown[2]) <= limits.acceleration_rad_s2 * elapsed_s + 1e-9
+    assert approached(current, target, 10.0, limits) == target
+
+
+@given(velocities)
+def test_an_approach_from_a_standstill_takes_as_long_as_its_slowest_part(target: Velocity) -> None:
+    limits = Limits()
+    needed_s = max(
+        target.linear_mps / limits.acceleration_mps2, abs(target.wz_rad_s) / limits.acceleration_rad_s2
+    )
+    half = approached(ZERO, target, needed_s / 2, limits)
+    assert astuple(half) == pytest.approx(astuple(target.scaled(0.5)), abs=1e-9)
+    assert astuple(approached(ZERO, target, needed_s, limits)) == pytest.approx(astuple(target), abs=1e-9)
