@@ -81,15 +81,11 @@ class Base:
     """What the graph says about the base, and the publisher of its velocities."""
 
     def __init__(self, node: Any, settings: DriveSettings) -> None:
+        outputs = [output.topic for output in settings.outputs]
+        mux_output = settings.mux_output.topic if settings.mux_output else None
         self._velocities = VelocityPublisher(node, settings.outputs)
         self._lock = Lock(node, settings.lock_topic) if settings.lock_topic else None
-        self._takers = Takers(
-            node,
-            self._velocities,
-            [output.topic for output in settings.outputs],
-            settings.mux_output.topic if settings.mux_output else None,
-            OWN_NODES,
-        )
+        self._takers = Takers(node, self._velocities, outputs, mux_output, OWN_NODES)
         self._outranking = Outranking() if settings.mux_output else None
         self._mux_output = (
             subscribe(node, settings.mux_output.type, settings.mux_output.topic)
@@ -99,10 +95,7 @@ class Base:
         self._odometry = (
             subscribe(node, "nav_msgs/msg/Odometry", settings.odometry) if settings.odometry else None
         )
-        watched = (*settings.outputs, *((settings.mux_output,) if settings.mux_output else ()))
-        self._other_sources = OtherSources(
-            node, [output.topic for output in settings.outputs], {each.topic for each in watched}
-        )
+        self._other_sources = OtherSources(node, outputs, mux_output)
         self._stops = stop_inputs(node, settings)
         self._problems: list[str] = []
         self._still: tuple[int, bool] | None = None

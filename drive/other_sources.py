@@ -6,7 +6,7 @@ shows that there is one; before it, its messages do.
 
 import logging
 import time
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Final
 
 from common.ros_node import OWN_NODES
@@ -43,18 +43,19 @@ class _Input:
 
 
 class OtherSources:
-    """Listens to the inputs of whatever takes our velocities, without those that are ours.
+    """Listens to the inputs of the multiplexer, without those that are ours.
 
     Args:
         node: of rclpy.
         outputs: topics that our velocities are published on.
-        ours: topics on which our own velocities are seen.
+        mux_output: topic on which the multiplexer publishes; None if it is not known.
     """
 
-    def __init__(self, node: Any, outputs: Sequence[str], ours: Container[str]) -> None:
+    def __init__(self, node: Any, outputs: Sequence[str], mux_output: str | None) -> None:
         self._began_ns = time.monotonic_ns()
         self._node = node
-        self._outputs, self._ours = outputs, ours
+        self._outputs, self._mux_output = outputs, mux_output
+        self._ours = {*outputs, mux_output}
         self._inputs: dict[str, _Input] = {}
         self._found: dict[str, str] = {}
         self._looked_ns = self._taken_ns = 0
@@ -93,16 +94,21 @@ class OtherSources:
             self._found = found
 
     def _other_inputs(self) -> Iterator[tuple[str, str]]:
-        """Yields topic and type of each velocity that the takers of ours take, too."""
-        for output in self._outputs:
-            for taker in self._node.get_subscriptions_info_by_topic(output):
-                if taker.node_name in OWN_NODES:
-                    continue
-                for topic, types in self._node.get_subscriber_names_and_types_by_node(
-                    taker.node_name, taker.node_namespace
-                ):
-                    if topic not in self._ours and (known := _TYPES.intersection(types)):
-                        yield topic, min(known)
+        """Yields topic and type of each velocity that the multiplexer takes beside ours."""
+        for name, namespace in set().union(*map(self._multiplexers, self._outputs)):
+            for topic, types in self._node.get_subscriber_names_and_types_by_node(name, namespace):
+                if topic not in self._ours and (known := _TYPES.intersection(types)):
+                    yield topic, min(known)
+
+    def _multiplexers(self, output: str) -> set[tuple[str, str]]:
+        """Returns the nodes that take an output and publish what reaches the base: names and namespaces.
+
+        Where none does, or what reaches the base is not known, all that take it count. A node that only
+        records takes whatever there is, measured velocities as well.
+        """
+        takers = _nodes(self._node.get_subscriptions_info_by_topic(output))
+        publishing = self._node.get_publishers_info_by_topic(self._mux_output) if self._mux_output else ()
+        return takers & _nodes(publishing) or takers
 
     def _follow(self, now_ns: int) -> None:
         """Adds one input that is missing, or removes one: each takes the middleware a few milliseconds."""
@@ -113,3 +119,8 @@ class OtherSources:
             if len(self._inputs) < _MOST:
                 self._inputs[topic] = _Input(self._node, topic, self._found[topic], now_ns)
             return
+
+
+def _nodes(endpoints: Iterable[Any]) -> set[tuple[str, str]]:
+    """Returns the nodes that are none of this project's, by name and namespace."""
+    return {(each.node_name, each.node_namespace) for each in endpoints if each.node_name not in OWN_NODES}
