@@ -159,6 +159,7 @@ def actual_state(
         counters=counters,
         problems=problems,
         reset_obstacle=reset_obstacle(state, now_ns) if state.latch else "",
+        enabled=state.enabled,
     )
     if command:
         message.newest_sequence, message.command_ns = command.sequence, state.command_ns

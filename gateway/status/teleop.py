@@ -120,6 +120,7 @@ class DriveActual:
         problems: of the base, for people.
         base_timeout_ms: silence after which the base stops by itself; None if it is not known.
         reset_obstacle: what keeps the stop from being reset, for people; empty when nothing does.
+        enabled: whether anyone may drive, whatever the phase; None of an older drive program.
     """
 
     instance_id: str
@@ -137,6 +138,7 @@ class DriveActual:
     problems: tuple[str, ...] = ()
     base_timeout_ms: int | None = None
     reset_obstacle: str = ""
+    enabled: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ class DriveModel:
 
     def adopt(self, spec: DriveSpec, report: DriveReport) -> tuple[DriveSpec, bool]:
         """Keeps driving disabled that an earlier gateway had disabled; otherwise the configuration counts."""
-        if report.applied_revision and report.phase is DrivePhase.DISABLED:
+        if report.applied_revision and not _may_be_driven(report):
             return DriveSpec(enabled=False), False
         return spec, True
 
@@ -46,3 +46,8 @@ class DriveModel:
             error=reconciler.error or reconciler.refusal or "",
             actual=last,
         )
+
+
+def _may_be_driven(report: DriveReport) -> bool:
+    # Of an older drive program the phase is all there is; a stop hides there that driving is disabled.
+    return report.phase is not DrivePhase.DISABLED if report.enabled is None else report.enabled

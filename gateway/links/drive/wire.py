@@ -239,5 +239,6 @@ def report_from(welcome: pb.Welcome, message: pb.ActualState) -> DriveReport:
         episode=same_fields(DriveEpisode, message.episode) if message.HasField("episode") else None,
         problems=tuple(message.problems),
         reset_obstacle=message.reset_obstacle,
+        enabled=message.enabled if message.HasField("enabled") else None,
         base_timeout_ms=welcome.base_timeout_ms if welcome.HasField("base_timeout_ms") else None,
     )

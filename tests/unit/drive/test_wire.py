@@ -95,6 +95,14 @@ def test_no_caller_makes_a_report_larger_than_a_packet() -> None:
     assert report.ByteSize() < MAX_MESSAGE_BYTES - 1024
 
 
+@pytest.mark.parametrize("enabled", [True, False])
+def test_a_report_says_whether_anyone_may_drive_although_the_phase_is_stopped(enabled: bool) -> None:
+    state = State(phase=Phase.STOPPED, enabled=enabled, latch=Latch(4, "ben", "a child"))
+    report = actual_state(state, Rules(), 0, revision=1, counters=pb.Counters(), episode=None, problems=[])
+    assert report.HasField("enabled")
+    assert report.enabled is enabled
+
+
 def test_the_welcome_has_the_limits_in_effect() -> None:
     rules = Rules(deadlines=Deadlines(picture_ns=300_000_000))
     limits = welcome("1", rules, 500).welcome.limits

@@ -51,6 +51,9 @@ def test_every_field_of_a_report_arrives() -> None:
     assert report.problems == tuple(message.problems)
     assert report.base_timeout_ms == welcome.base_timeout_ms
     assert wire.report_from(pb.Welcome(), message).base_timeout_ms is None
+    assert report.enabled is True
+    message.ClearField("enabled")
+    assert wire.report_from(pb.Welcome(), message).enabled is None
     parts = (
         (report.limits, welcome.limits, DriveLimits),
         (report.stop, message.stop, StopLatch),
