@@ -16,10 +16,10 @@ from console.client.mapping.methods import DRIVE, Method
 from console.client.results import DriveOpened, DriveState, Supervision
 
 MAX_UNACKNOWLEDGED: Final = 10
-"""Commands on their way on one lane; what would queue behind them is too old to count."""
+"""Commands on their way on one lane; what would queue behind them is too old to count. A release passes."""
 MAX_UNANSWERED: Final = 100
-"""Commands on one lane since its last state: it has stood still for 2 s. What it holds must not come as more
-at once than the gateway takes (200)."""
+"""Commands on one lane since its last state: it has stood still for 2 s. What it holds, with a release that
+has passed, must not come as more at once than the gateway takes (200)."""
 LANES: Final = 3
 """Of a session, unless the gateway takes fewer. A lost packet holds a lane up; all at once are held up for
 longer than a command is valid every half hour on a link that loses 10 %, two of two every minute."""
@@ -259,9 +259,9 @@ class Lanes:
             await self._commands.wait_until(lambda: self._newest.sequence > seen)  # noqa: B023  # read at once
             command = self._newest
             seen = command.sequence
-            if on_their_way.full and not command.last:
+            if not (on_their_way.has_room(held=command.held) or command.last):
                 continue
-            on_their_way.add(seen)
+            on_their_way.add(seen, held=command.held)
             with contextlib.suppress(GatewayError):  # The reader finds out why the lane has ended.
                 await lane.write(command.request)
                 self._user.left(command)
@@ -281,21 +281,33 @@ class OnTheirWay:
 
     A state on any lane acknowledges. A lane that counted only its own would fall silent whenever a lost
     packet holds its states up, and leave the robot to the other one alone.
+
+    A lane is also full when only the states are held up: a release that waited for them would let the robot
+    go on by the commands that have arrived. So the first command that does not hold, after one that did,
+    always has room; those behind it wait, and with them the next hold.
     """
 
     def __init__(self) -> None:
         self._sequences: list[int] = []
         self._unanswered = 0
+        self._held = False
+        """Whether the newest of them holds."""
 
-    @property
-    def full(self) -> bool:
-        """Whether another command would only queue behind these."""
-        return len(self._sequences) >= MAX_UNACKNOWLEDGED or self._unanswered >= MAX_UNANSWERED
+    def has_room(self, *, held: bool) -> bool:
+        """Whether another command has room; one that would only queue behind these has none.
 
-    def add(self, sequence: int) -> None:
+        Args:
+            held: whether it holds.
+        """
+        if self._held and not held:
+            return True
+        return len(self._sequences) < MAX_UNACKNOWLEDGED and self._unanswered < MAX_UNANSWERED
+
+    def add(self, sequence: int, *, held: bool) -> None:
         """Adds a command that is written now."""
         self._sequences.append(sequence)
         self._unanswered += 1
+        self._held = held
 
     def answered(self) -> None:
         """Notes that a state has come on this lane."""

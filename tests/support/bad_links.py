@@ -35,10 +35,12 @@ class Relay:
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port: int = self._listener.getsockname()[1]
         self._pairs: dict[socket.socket, socket.socket] = {}
+        self._servers: set[socket.socket] = set()
         self._silent: set[socket.socket] = set()
         self._wake_here, self._wake_there = socket.socketpair()
         self._fall_silent = threading.Event()
         self._cut = threading.Event()
+        self._answers_held = threading.Event()
         self._ended = threading.Event()
         self.connections = 0
         self._thread = threading.Thread(target=self._run, name="relay")
@@ -59,6 +61,16 @@ class Relay:
         self._fall_silent.set()
         self._wake_there.send(b"x")
 
+    def hold_answers(self) -> None:
+        """From now on what the server sends waits; what clients send passes."""
+        self._answers_held.set()
+        self._wake_there.send(b"x")
+
+    def pass_answers(self) -> None:
+        """Passes on what has waited, and what comes."""
+        self._answers_held.clear()
+        self._wake_there.send(b"x")
+
     def cut(self) -> None:
         """Closes the connections that exist; new ones work."""
         self._cut.set()
@@ -66,7 +78,9 @@ class Relay:
 
     def _run(self) -> None:
         while not self._ended.is_set():
-            ready, _, _ = select.select([self._listener, self._wake_here, *self._pairs], [], [])
+            held = self._servers if self._answers_held.is_set() else set()
+            passing = [one for one in self._pairs if one not in held]
+            ready, _, _ = select.select([self._listener, self._wake_here, *passing], [], [])
             for one in ready:
                 if one is self._listener:
                     self._accept()
@@ -92,6 +106,7 @@ class Relay:
             near.close()
             return
         self._pairs[near], self._pairs[far] = far, near
+        self._servers.add(far)
         self.connections += 1
 
     def _pass_on(self, one: socket.socket) -> None:

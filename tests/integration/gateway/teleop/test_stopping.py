@@ -33,11 +33,14 @@ from tests.support.heard import Base
 from tests.support.module_program import module_program
 from tests.support.promise import keeps_async
 from tests.support.running_drive import RunningDrive
+from tests.support.undisturbed import DisturbedError
 
 pytestmark = [pytest.mark.ros, pytest.mark.timed, pytest.mark.alone]
 ROOT = Path(__file__).parents[4]
 SPEED_MPS = 0.1
 FROZEN_S = 0.3
+HELD_UP_S = 0.26
+"""The lanes are full after 0.2 s; after 0.4 s without a state the robot stops by itself."""
 QUIET_S = 0.7
 """Longer than any motion may last after a fault."""
 WATCHERS = 100
@@ -79,6 +82,32 @@ async def test_a_release_stops_within_60_ms(robot: DrivenRobot) -> None:
             return slowest_s
 
     await keeps_async(0.06, "s of motion after a release", measure)
+
+
+async def test_a_release_stops_within_60_ms_while_the_robots_states_are_held_up(robot: DrivenRobot) -> None:
+    async def measure() -> float:
+        async with available(robot):
+            with Relay(robot.gateway.port) as relay:
+                return await released_after_s(robot, relay)
+
+    await keeps_async(0.06, "s of motion after a release whose lanes were full", measure)
+
+
+async def released_after_s(robot: DrivenRobot, relay: Relay) -> float:
+    """How long the base moves after a release by full lanes, which no state of the robot empties."""
+    async with AsyncGatewayClient(f"127.0.0.1:{relay.port}") as client, client.drive(BY_EYE) as session:
+        await in_motion(client, session, robot.base, SPEED_MPS)
+        with moving(robot.base, robot.drive):
+            async with held(session, SPEED_MPS):
+                relay.hold_answers()
+                await asyncio.sleep(HELD_UP_S)
+                was_held(session)
+                if not robot.base.moves:
+                    raise DisturbedError("the robot has stopped before the release")
+                began_s = time.monotonic()
+            await asyncio.sleep(QUIET_S)
+            relay.pass_answers()
+        return robot.base.stopped_after_s(began_s)
 
 
 async def test_a_killed_client_stops_within_100_ms(robot: DrivenRobot) -> None:

@@ -50,6 +50,9 @@ class Robot:
 
     def __init__(self) -> None:
         self.answers = True
+        self.takes = asyncio.Event()
+        """Set while the lanes take what is written on them."""
+        self.takes.set()
         self.ends_with: Refused | None = None
         self.opens_with: Refused | None = None
         self.max_lanes = LANES
@@ -97,11 +100,14 @@ class Robot:
 class PlayedLane:
     def __init__(self, robot: Robot) -> None:
         self._robot, self._opened = robot, False
-        self.lost = self.silent = False
+        self.lost = self.silent = self.writing = False
         self.written = 0
         self._finished = asyncio.Event()
 
     async def write(self, request: bytes) -> None:
+        self.writing = True
+        await self._robot.takes.wait()
+        self.writing = False
         self.written += 1
         self._robot.take(request)
 
@@ -228,29 +234,51 @@ async def test_a_release_and_a_hold_at_once_are_two_holds() -> None:
         assert holds[-5:] == [True] * 5
 
 
+def held_for(session: DriveSession, commands: int) -> Callable[[], bool]:
+    """A condition: that the driver has held while so many more commands were made, written or not."""
+    until_sequence = session._commands.sequence + commands
+
+    def enough() -> bool:
+        session.hold(SPEED_MPS)
+        return session._commands.sequence > until_sequence
+
+    return enough
+
+
 async def test_no_hold_begins_before_the_release_has_left() -> None:
     robot = Robot()
     async with driving(robot) as session:
         await more_commands(robot, 10, partial(session.hold, SPEED_MPS))
-        robot.answers = False
-
-        def holds_for(commands: int) -> Callable[[], bool]:
-            until_sequence = session._commands.sequence + commands
-
-            def enough() -> bool:
-                session.hold(SPEED_MPS)
-                return session._commands.sequence > until_sequence
-
-            return enough
-
-        await until(holds_for(2 * MAX_UNACKNOWLEDGED), "the lanes are full")
+        robot.takes.clear()
+        await until(lambda: all(lane.writing for lane in robot.lanes), "each lane is at a write")
         stuck = len(robot.commands)
         session.release()
-        await until(holds_for(5), "held again, for some commands")
+        await until(held_for(session, 5), "held again, for some commands")
         assert len(robot.commands) == stuck, "nothing has left since the release"
+        robot.takes.set()
+        holds = await more_commands(robot, 10, partial(session.hold, SPEED_MPS))
+        released = holds.index(False)
+        assert released <= LANES, "what was being written, then the release"
+        assert holds[-3:] == [True] * 3
+
+
+async def test_a_release_passes_lanes_that_are_full_and_the_next_hold_waits() -> None:
+    """As where only the states are held up: the robot has all commands, and would go on by the last one."""
+    robot = Robot()
+    async with driving(robot) as session:
+        await more_commands(robot, 10, partial(session.hold, SPEED_MPS))
+        robot.answers = False
+        await until(held_for(session, 2 * MAX_UNACKNOWLEDGED), "the lanes are full")
+        full, written = len(robot.commands), [lane.written for lane in robot.lanes]
+        await until(held_for(session, 5), "they are")
+        assert len(robot.commands) == full
+        session.release()
+        await until(lambda: len(robot.commands) > full, "the release")
+        await until(held_for(session, 5), "held again, for some commands")
+        assert not any(command.held for command in robot.commands[full:])
+        assert [lane.written for lane in robot.lanes] == [each + 1 for each in written]
         robot.answers = True
         holds = await more_commands(robot, 10, partial(session.hold, SPEED_MPS))
-        assert not holds[0]
         assert holds[-3:] == [True] * 3
 
 

@@ -125,8 +125,8 @@ class Drive:
                 self.commands.hold(Hold(0.1, 0.0, 0.0, "gamepad", now_s))
             command = self.commands.make(now_s, self.clock, 0)
             for line, on_their_way in zip(self.up, self.on_their_way, strict=True):
-                if not on_their_way.full:
-                    on_their_way.add(command.sequence)
+                if on_their_way.has_room(held=command.held):
+                    on_their_way.add(command.sequence, held=command.held)
                     self.commands.left(held=command.held)
                     self.at(line.arrival_s(now_s), partial(self.take_command, command))
         self.at(now_s + COMMAND_EVERY_S, self.send_command)
