@@ -9,7 +9,7 @@ from gateway.status.teleop import DriveEpisode
 from gateway.teleop.lease import Driver
 
 _REMEMBERED: Final = 8
-"""Drivers: a time of motion may end after its lease."""
+"""Drivers and their devices: the end of a motion may be reported after its lease, and after the next hold."""
 _NS_PER_S: Final = 1_000_000_000
 
 
@@ -30,12 +30,12 @@ class Episodes:
     def __init__(self, sink: EpisodeSink) -> None:
         self._sink = sink
         self._began_ns = time.monotonic_ns()
-        self._drivers: deque[tuple[Driver, str]] = deque(maxlen=_REMEMBERED)
+        self._drivers: deque[tuple[int, Driver, str]] = deque(maxlen=_REMEMBERED)
         self._recorded: tuple[int, int] | None = None
 
     def note(self, driver: Driver, input_device: str) -> None:
         """Notes who drives from now on, and with what."""
-        self._drivers.append((driver, input_device))
+        self._drivers.append((time.monotonic_ns(), driver, input_device))
 
     def record(self, _instance_id: str, episode: DriveEpisode) -> None:
         """Records a time of motion that has ended, once.
@@ -46,8 +46,7 @@ class Episodes:
         if self._recorded == number or self._was_recorded(episode):
             return
         self._recorded = number
-        drivers = (each for each in reversed(self._drivers) if each[0].name == episode.holder)
-        driver, device = next(drivers, (Driver("", episode.holder, ""), ""))
+        driver, device = self._driver_of(episode)
         duration_s = (episode.ended_ns - episode.started_ns) / _NS_PER_S
         motion = Motion(duration_s, episode.distance_m, episode.turned_rad, device)
         self._sink.record_action(
@@ -63,6 +62,13 @@ class Episodes:
                 motion=motion,
             )
         )
+
+    def _driver_of(self, episode: DriveEpisode) -> tuple[Driver, str]:
+        """Returns who drove, and with what at last."""
+        for noted_ns, driver, device in reversed(self._drivers):
+            if driver.name == episode.holder and noted_ns <= episode.ended_ns:
+                return driver, device
+        return Driver("", episode.holder, ""), ""
 
     def _was_recorded(self, episode: DriveEpisode) -> bool:
         """Whether an earlier gateway has recorded it, as far as an older drive program lets one know."""

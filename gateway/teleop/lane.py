@@ -54,6 +54,7 @@ class Driving:
     Attributes:
         newest: the newest command that has arrived, passed on or not.
         arrived_ns: when it arrived.
+        device: what the driver has held with last; None before the first hold.
         later: passes the command on that waits.
     """
 
@@ -61,6 +62,7 @@ class Driving:
     pacing: Pacing[DriveCommand]
     newest: DriveCommand | None = None
     arrived_ns: int = 0
+    device: str | None = None
     later: asyncio.TimerHandle | None = None
 
 

@@ -174,7 +174,8 @@ class Teleop:
         now_s = time.monotonic()
         if not self._lease.take(driving.session, command.sequence, now_s, held=command.held):
             return
-        if driving.newest is None:
+        if command.held and driving.device != input_device:
+            driving.device = input_device
             self._episodes.note(driving.session.driver, input_device)
         driving.newest, driving.arrived_ns = command, time.monotonic_ns()
         if command.held or not driving.session.streaming:

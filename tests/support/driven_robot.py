@@ -159,7 +159,14 @@ def drives_undisturbed(robot: DrivenRobot, attempt: Callable[[], None]) -> None:
     undisturbed(begun)
 
 
-async def in_motion(client: AsyncGatewayClient, session: DriveSession, base: Base, speed_mps: float) -> None:
+async def in_motion(
+    client: AsyncGatewayClient,
+    session: DriveSession,
+    base: Base,
+    speed_mps: float,
+    *,
+    input_device: str = "",
+) -> None:
     """Holds anew until base and driver have motion; a busy machine may take several attempts.
 
     A machine that delays the drive program's worker has it replaced, which leaves a stop: that is reset. The
@@ -170,6 +177,7 @@ async def in_motion(client: AsyncGatewayClient, session: DriveSession, base: Bas
         session: its hold, or another operator's.
         base: what moves.
         speed_mps: straight ahead.
+        input_device: what is held; by default the session's own.
     """
     attempts = 0
 
@@ -179,7 +187,7 @@ async def in_motion(client: AsyncGatewayClient, session: DriveSession, base: Bas
             session.release()
             await ready_after_a_loss(client, session)
         attempts += 1
-        session.hold(speed_mps)
+        session.hold(speed_mps, input_device=input_device)
         return base.moves and session.state is not None and session.state.phase is DrivePhase.DRIVING
 
     await eventually(moves, bool, "the base moves, and the driver knows", _IN_MOTION_WITHIN_S)

@@ -1,6 +1,7 @@
 """What the robot's audit log keeps of driving: each time of motion, each stop, and who was refused."""
 
 import asyncio
+import itertools
 import json
 import os
 import signal
@@ -11,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from console.client import AsyncGatewayClient, DriveSession, GatewayError, NotAllowed, Refused
+from console.client import AsyncGatewayClient, DrivePhase, DriveSession, GatewayError, NotAllowed, Refused
 from gateway.access.role import Role
 from tests.support.driven_robot import BY_EYE, held, in_motion, was_held
 from tests.support.eventually import eventually
@@ -62,11 +63,7 @@ async def driven_stopped_and_refused(robot: Guarded, base: Base, directory: Path
         AsyncGatewayClient(robot.target, credentials=anna) as driver,
         AsyncGatewayClient(robot.target, credentials=vic) as viewer,
     ):
-
-        async def enabled() -> bool:
-            return (await driver.status()).teleop.enabled
-
-        await eventually(enabled, bool, "driving is enabled")
+        await eventually(lambda: is_enabled(driver), bool, "driving is enabled")
         async with driver.drive(BY_EYE) as session:
             await in_motion(driver, session, base, SPEED_MPS)
             async with held(session, SPEED_MPS):
@@ -107,6 +104,41 @@ async def driven_stopped_and_refused(robot: Guarded, base: Base, directory: Path
     assert all("a child on the track" in each["request"] for each in stops)
     refused = records(directory / "credentials/audit-refused.jsonl")
     assert {(each["who"], each["action"]) for each in refused} >= {("vic", "ResetStop")}
+
+
+@pytest.mark.usefixtures("module_ros_domain")
+async def test_each_motion_names_the_device_that_was_held(tmp_path: Path) -> None:
+    await without_stall_async(driven_by_several_devices, tmp_path)
+
+
+async def driven_by_several_devices(directory: Path) -> None:
+    devices = ["gamepad", "keyboard", "gamepad"]
+    with guarded(directory) as (robot, base):
+        anna, _ = robot.added("anna", Role.OPERATOR)
+        async with AsyncGatewayClient(robot.target, credentials=anna) as driver:
+            await eventually(lambda: is_enabled(driver), bool, "driving is enabled")
+            # Its commands name the session's own device while nothing is held.
+            async with driver.drive(BY_EYE) as session:
+                for device in devices:
+                    await in_motion(driver, session, base, SPEED_MPS, input_device=device)
+                    session.release()
+                    await eventually(lambda: is_armed(session), bool, "the motion has ended")
+
+        async def held_with() -> list[str]:
+            """A hold that was not renewed in time, in a stall, makes two motions of one."""
+            named = (each["request"].rpartition(" by ")[2] for each in motions(directory))
+            return [device for device, _ in itertools.groupby(named)]
+
+        await eventually(held_with, lambda it: it == devices, "each motion with its device")
+
+
+async def is_enabled(client: AsyncGatewayClient) -> bool:
+    return (await client.status()).teleop.enabled
+
+
+async def is_armed(session: DriveSession) -> bool:
+    session.check()
+    return session.state is not None and session.state.phase is DrivePhase.ARMED
 
 
 @pytest.mark.usefixtures("module_ros_domain")

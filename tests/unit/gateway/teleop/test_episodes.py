@@ -20,6 +20,7 @@ class Sink:
 
 
 def ended(episode_id: int = 1, holder: str = "anna") -> DriveEpisode:
+    """A motion that ends now."""
     now_ns = time.monotonic_ns()
     return DriveEpisode(episode_id, holder, now_ns - 2_500_000_000, now_ns, 0.25, 1.5, "released")
 
@@ -38,6 +39,19 @@ def test_it_says_who_how_long_how_far_and_why_it_ended() -> None:
     )
     assert (action.method, action.request) == ("Drive", "2.5 s, 0.25 m, 86 deg, by gamepad")
     assert action.answer == "released"
+
+
+def test_the_device_is_that_of_the_motion_and_not_of_the_hold_after_it() -> None:
+    """The report of a motion's end may wait while the next hold arrives."""
+    sink = Sink()
+    episodes = Episodes(sink)
+    for device in ("keyboard", "gamepad"):
+        episodes.note(ANNA, device)
+    motion = ended()
+    episodes.note(ANNA, "monitor")
+    episodes.record("process", motion)
+    (action,) = sink.actions
+    assert action.request.endswith("by gamepad")
 
 
 def test_it_is_recorded_once_for_each_process() -> None:
