@@ -8,7 +8,7 @@ from gateway.links.drive.state import DriveCommand
 from gateway.status.values import Velocity
 from gateway.teleop.lane import Driving, is_finite
 from gateway.teleop.lease import Demand, Driver
-from gateway.teleop.stops import HOW_TO_REACH
+from gateway.teleop.stops import HOW_TO_REACH, in_words
 from gateway.teleop.teleop import Teleop
 
 _VALID_NS: Final = 500_000_000
@@ -43,7 +43,7 @@ class SingleCommands:
             return False, error
         stop = self._teleop.link.view.stop
         if stop:
-            return True, f"the robot is stopped by {stop.by}: reset the stop first"
+            return True, in_words(stop)
         reasons = "; ".join(each.value for each in self._teleop.view().inhibits)
         return True, f"the robot does not move: {reasons}" if reasons else "passed on"
 

@@ -34,6 +34,11 @@ MOST_COPIES: Final = 64
 """Requests that are remembered; a copy of an older one stops the robot, as one without a request ID does."""
 
 
+def in_words(stop: StopLatch) -> str:
+    """Returns what a stop means for a driver, and how it ends, for people."""
+    return f"the robot is stopped by {stop.by} until you type: robotctl reset-stop {stop.stop_id}"
+
+
 class Copies:
     """The stops that were confirmed lately, by the requests that made them."""
 

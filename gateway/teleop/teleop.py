@@ -51,7 +51,7 @@ from gateway.teleop.lease import (
     TooManyLanesError,
 )
 from gateway.teleop.pacing import Pacing
-from gateway.teleop.stops import CONFIRMED_WITHIN_S, HOW_TO_REACH, Stops
+from gateway.teleop.stops import CONFIRMED_WITHIN_S, HOW_TO_REACH, Stops, in_words
 
 _log = logging.getLogger(__name__)
 
@@ -219,12 +219,8 @@ class Teleop:
             return False, f"replaced by a newer request: driving {self.link.desired.spec}"
         if not view.applied:
             return False, f"the robot's drive program does not answer: {HOW_TO_REACH}"
-        if view.stop:
-            return (
-                True,
-                f"driving is {desired.spec}; the robot is stopped by {view.stop.by}: reset the stop first",
-            )
-        return True, f"driving is {desired.spec}"
+        stopped = f"; {in_words(view.stop)}" if view.stop else ""
+        return True, f"driving is {desired.spec}{stopped}"
 
     # --- the lease and the drive program ---
 
