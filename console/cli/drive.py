@@ -6,7 +6,7 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from common.errors import UserError
+from common.errors import ExitCode, UserError
 from console.cli import drive_terminal
 from console.cli.drive_input import Controls, Input, controls
 from console.cli.drive_keys import Action, Hands
@@ -22,7 +22,7 @@ from console.client import (
     GatewayError,
     Supervision,
 )
-from console.client.results import TeleopState
+from console.client.results import TeleopAnswer, TeleopState
 from console.presentation.json_form import json_form
 from console.steering import Speeds, permitted
 
@@ -36,6 +36,10 @@ TakeOverOption = Annotated[
     typer.Option("--take-over", help="Take the lease from another driver, who has not held for 2 s."),
 ]
 EnableOption = Annotated[bool, typer.Option("--enable", help="Enable driving first, for all.")]
+DisableOption = Annotated[
+    bool,
+    typer.Option("--disable", help="Disable driving, for all, and end; a session that drives ends, too."),
+]
 SpeedOption = Annotated[
     float | None,
     typer.Option("--speed", min=0.01, max=5, metavar="M/S", help="Speed.", show_default="what is permitted"),
@@ -64,6 +68,7 @@ def drive(
     *,
     take_over: TakeOverOption = False,
     enable: EnableOption = False,
+    disable: DisableOption = False,
     speed: SpeedOption = None,
     turn: TurnOption = None,
     by: InputOption = Input.AUTO,
@@ -75,6 +80,18 @@ def drive(
     report releases, for 0.3 s after each press. Gamepad: hold a shoulder button and steer, left stick forward
     and sideways, right stick turn; B stops the robot.
     """
+    if disable:
+        if take_over or enable or speed or turn or by is not Input.AUTO:
+            raise UserError(
+                "--disable drives nothing, and has no other option of drive beside it",
+                "Type: robotctl drive --disable",
+                exit_code=ExitCode.USAGE,
+            )
+        with session.connect() as gateway:
+            answer = gateway.set_driving_enabled(False)
+        _require_accepted(answer)
+        session.show_answer(answer)
+        return
     with controls(by) as steered_by:
         asyncio.run(_drive(session, steered_by, take_over=take_over, enable=enable, speeds=(speed, turn)))
 
@@ -98,11 +115,14 @@ async def _drive(
         if not has_keyboard():
             raise UserError("driving needs a terminal to type in", "Type the command in a terminal")
         if enable:
-            answer = await client.set_driving_enabled(True)
-            if not answer.accepted:
-                raise UserError(f"the robot refused: {answer.message}")
+            _require_accepted(await client.set_driving_enabled(True))
         async with client.drive(options) as driving:
             await _Cockpit(session, client, driving, speeds, steered_by).run()
+
+
+def _require_accepted(answer: TeleopAnswer) -> None:
+    if not answer.accepted:
+        raise UserError(f"the robot refused: {answer.message}")
 
 
 class _Cockpit:

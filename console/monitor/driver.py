@@ -169,9 +169,9 @@ class Driver:
         """Resets this stop; a newer one stays."""
         self._call_soon(partial(self._calls.start, partial(self._reset, stop_id)))
 
-    def enable(self) -> None:
-        """Enables driving, for all."""
-        self._call_soon(partial(self._calls.start, self._enable))
+    def set_enabled(self, enabled: bool) -> None:
+        """Enables driving, or disables it, for all."""
+        self._call_soon(partial(self._calls.start, partial(self._set_enabled, enabled)))
 
     # --- the loop ---
 
@@ -234,11 +234,12 @@ class Driver:
         except GatewayError as error:
             self._notes.add(f"Not reset: {error}", SeverityStyle.BAD)
 
-    async def _enable(self) -> None:
+    async def _set_enabled(self, enabled: bool) -> None:
         try:
-            answer = await self._robot.client.set_driving_enabled(True)
+            answer = await self._robot.client.set_driving_enabled(enabled)
         except GatewayError as error:
-            self._notes.add(f"Driving is not enabled: {error}", SeverityStyle.BAD)
+            wanted = "enabled" if enabled else "disabled"
+            self._notes.add(f"Driving is not {wanted}: {error}", SeverityStyle.BAD)
         else:
             self._notes.add(answer.message, SeverityStyle.QUIET if answer.accepted else SeverityStyle.BAD)
 

@@ -22,6 +22,8 @@ _STOP_HEIGHT_PX: Final = 48
 _BUTTON_HEIGHT_PX: Final = 23
 _TEXTS_WIDTH_PX: Final = 132
 _STOP_FONT_FACTOR: Final = 1.9
+_MENU_BESIDE: Final = QToolButton.ToolButtonPopupMode.MenuButtonPopup
+_MENU_ONLY: Final = QToolButton.ToolButtonPopupMode.InstantPopup
 _INK: Final = QColor("#000000")
 """On vermillion: a contrast of 5 or more (theme.py)."""
 
@@ -39,7 +41,8 @@ class DrivePlace(QWidget):
     """With the number of the stop that was shown."""
     begin_chosen = Signal(object, bool)
     """An entry of the menu: with the Supervision, and whether to take over."""
-    enable_chosen = Signal()
+    enabled_chosen = Signal(bool)
+    """An entry of the menu: whether driving is to be enabled, for all."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -71,8 +74,11 @@ class DrivePlace(QWidget):
         set_text(self.limits, f"at most {linear}, {angular}")
         self.setAccessibleName(f"{self.state.text()}, {self.limits.text()}")
         set_text(self.drive, "End driving" if view.open else "Opening ..." if view.opening else "Drive")
-        self.drive.setEnabled(view.open or (known and teleop.enabled and not view.opening))
+        self.drive.setEnabled(view.open or (known and not view.opening))
+        # Where driving is disabled, all there is to choose is in the menu: to enable it.
+        self.drive.setPopupMode(_MENU_BESIDE if view.open or teleop.enabled else _MENU_ONLY)
         self.enable.setEnabled(known and not teleop.enabled)
+        self.disable.setEnabled(known and teleop.enabled)
         for entry in self.begins:
             entry.setEnabled(known and teleop.enabled and not (view.open or view.opening))
         self._latch = latch
@@ -93,7 +99,7 @@ class DrivePlace(QWidget):
 
     def _lay_out(self) -> None:
         self.drive.setMenu(self._menu())
-        self.drive.setPopupMode(QToolButton.ToolButtonPopupMode.MenuButtonPopup)
+        self.drive.setPopupMode(_MENU_BESIDE)
         self.drive.setToolTip("Key T: take the robot to drive it, or give it back")
         self.drive.setAccessibleName("Drive")
         self.drive.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -121,7 +127,10 @@ class DrivePlace(QWidget):
             )
         ]
         menu.addSeparator()
-        self.enable = menu.addAction("Enable driving, for all", self.enable_chosen.emit)
+        self.enable, self.disable = (
+            menu.addAction(text, partial(self.enabled_chosen.emit, enabled))
+            for text, enabled in (("Enable driving, for all", True), ("Disable driving, for all", False))
+        )
         menu.addSeparator()
         self.pad = menu.addAction("Gamepad: none")
         self.pad.setEnabled(False)

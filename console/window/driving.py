@@ -53,7 +53,7 @@ class Driving(QObject):
         place.drive_pressed.connect(self.toggle)
         place.begin_chosen.connect(self.begin)
         place.reset_pressed.connect(self._driver.reset)
-        place.enable_chosen.connect(self._driver.enable)
+        place.enabled_chosen.connect(self._driver.set_enabled)
 
     def show_state(self, state: MonitorState) -> None:
         """Shows the latest state. What was known of driving stays while the robot does not answer."""

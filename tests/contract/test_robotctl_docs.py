@@ -26,6 +26,7 @@ from console.client.mapping.methods import (
     GET_SYSTEM_STATUS,
     LIST_RECORDINGS,
     RESET_STOP,
+    SET_TELEOP_ENABLED,
     START_RECORDING,
     STOP_ROBOT,
     SUBSCRIBE_EVENTS,
@@ -49,7 +50,11 @@ from omniseer.gateway.v1.recording_pb2 import (
     StartRecordingResponse,
     UploadRecordingResponse,
 )
-from omniseer.gateway.v1.robot_gateway_pb2 import GetGatewayInfoResponse, SubscribeEventsResponse
+from omniseer.gateway.v1.robot_gateway_pb2 import (
+    GetGatewayInfoResponse,
+    SetTeleopEnabledResponse,
+    SubscribeEventsResponse,
+)
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus
 from omniseer.gateway.v1.teleop_pb2 import DriveResponse, ResetStopResponse, StopRobotResponse
 from tests.support.filled import fill
@@ -161,6 +166,11 @@ def fleet_command() -> dict[str, Any]:
             "reset-stop --json",
             {"ok": True, **json_form(RESET_STOP.decode(filled(ResetStopResponse())))},
             id="reset-stop",
+        ),
+        pytest.param(
+            "drive --disable --json",
+            {"ok": True, **json_form(SET_TELEOP_ENABLED.decode(filled(SetTeleopEnabledResponse())))},
+            id="drive --disable",
         ),
         pytest.param("drive --json", json_form(drive_item(drive_state())), id="drive"),
         pytest.param(

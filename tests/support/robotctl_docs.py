@@ -21,6 +21,7 @@ _TYPES: Final[Mapping[str, tuple[type, ...]]] = {
     # Described by a section of its own.
     "status": (dict,),
     "preview": (dict,),
+    "teleop": (dict,),
     "recording": (dict,),
     "event": (dict,),
 }
@@ -107,7 +108,7 @@ def _referred(said: Documented) -> dict[str, Type]:
             said_of_events = documented("events --json").items()
             inner_keys = {inner: type_ for inner, type_ in said_of_events if inner.startswith("event.")}
             more |= {f"{key}.{inner.removeprefix('event.')}": type_ for inner, type_ in inner_keys.items()}
-        elif kind.words == "preview" or (key, kind.words) == ("gateway", "object"):
+        elif kind.words in {"preview", "teleop"} or (key, kind.words) == ("gateway", "object"):
             status = documented("status --json")
             more |= {inner: type_ for inner, type_ in status.items() if inner.startswith(f"{key}.")}
     return more

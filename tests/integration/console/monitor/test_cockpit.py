@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QObject, QPoint, QRect, Qt
 from PySide6.QtGui import QImage, QShortcut
-from PySide6.QtWidgets import QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QLabel, QPushButton, QToolButton, QWidget
 from shiboken6 import isValid
 
 from common.errors import UserError
@@ -225,6 +225,22 @@ def test_nothing_looks_alive_while_the_robot_does_not_answer(cockpit: Cockpit) -
     assert [note.marker.severity for note in window.side.notes.shown] == [SeverityStyle.QUIET]
     robot.hold.set()
     until(lambda: place.state.text() == "Driving enabled" and place.drive.isEnabled(), "it answers again")
+
+
+def test_driving_is_disabled_and_enabled_again_in_the_menu_of_drive(cockpit: Cockpit) -> None:
+    with_teleop(cockpit.robot.gateway)
+    teleop, place = cockpit.robot.gateway.status.teleop, cockpit.window.strip.driving
+    until(place.isVisible, "the place of driving")
+    for state, entry, other in (
+        (states_pb2.TELEOP_ENABLED, place.disable, place.enable),
+        (states_pb2.TELEOP_DISABLED, place.enable, place.disable),
+    ):
+        teleop.state, teleop.enabled = state, state == states_pb2.TELEOP_ENABLED
+        until(lambda: entry.isEnabled() and not other.isEnabled(), "what can be chosen")  # noqa: B023  # at once
+        assert place.drive.isEnabled(), "its menu can be opened"
+        assert (place.drive.popupMode() is QToolButton.ToolButtonPopupMode.InstantPopup) is not teleop.enabled
+        entry.trigger()
+        cockpit.note(f"Driving is not {'disabled' if teleop.enabled else 'enabled'}")
 
 
 def test_a_message_is_closed_with_esc(cockpit: Cockpit) -> None:

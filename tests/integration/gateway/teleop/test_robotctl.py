@@ -11,6 +11,7 @@ from typing import ParamSpec
 
 import pytest
 
+from common.errors import ExitCode
 from console.cli.drive_keys import KNOWN_FOR_S
 from console.cli.loop_signals import ENDING
 from console.gamepad.silence import HELD_FOR_S
@@ -171,6 +172,37 @@ def test_space_stops_and_the_stop_is_reset_by_its_number(robot: DrivenRobot) -> 
         assert "is reset" in reset.stdout
         screen.press("\x03")
         assert screen.process.wait(20) == 0
+
+
+@driven
+def test_driving_is_disabled_without_a_terminal_and_enabled_again(robot: DrivenRobot) -> None:
+    try:
+        with robotctl_on_terminal("drive", "--target", robot.target) as screen:
+            begin(screen, PLAIN_ANSWER)
+            disabled = robotctl("drive", "--disable", "--target", robot.target, "--json")
+            assert disabled.returncode == 0, disabled.stderr
+            document = json.loads(disabled.stdout)
+            assert (document["ok"], document["teleop"]["enabled"]) == (True, False)
+            assert screen.process.wait(20) == 1, "its session has ended"
+        assert not robot.teleop.enabled
+        again = robotctl_process("drive", "--disable", "--target", robot.target)
+        assert (again.returncode, again.stdout) == (0, "driving is disabled\n")
+    finally:
+        with robotctl_on_terminal("drive", "--enable", "--target", robot.target) as screen:
+            begin(screen, PLAIN_ANSWER)
+            screen.press("x")
+            assert screen.process.wait(20) == 0
+    assert robot.teleop.enabled
+
+
+@pytest.mark.parametrize(
+    "more", [("--enable",), ("--take-over",), ("--speed", "0.1"), ("--turn", "0.1"), ("--input", "keyboard")]
+)
+def test_what_drives_is_refused_beside_disable(robot: DrivenRobot, more: tuple[str, ...]) -> None:
+    refused = robotctl("drive", "--disable", *more, "--target", robot.target)
+    assert refused.returncode == ExitCode.USAGE
+    assert "--disable drives nothing" in refused.stderr
+    assert robot.teleop.enabled
 
 
 @contextmanager

@@ -37,6 +37,7 @@ class PlayedClient:
     confirmed: int = 0
     resets: list[int] = field(default_factory=list)
     opened: list[DriveOptions | None] = field(default_factory=list)
+    switched: list[bool] = field(default_factory=list)
     accepts: bool = True
 
     @property
@@ -62,7 +63,9 @@ class PlayedClient:
         return StopReset(message="the stop is reset", phase=DrivePhase.AVAILABLE)
 
     async def set_driving_enabled(self, enabled: bool) -> TeleopAnswer:
-        assert enabled
+        self.switched.append(enabled)
+        if self.error:
+            raise self.error
         return TeleopAnswer(accepted=self.accepts, message="as asked", teleop=snapshot().status.teleop)
 
 
@@ -169,9 +172,21 @@ async def test_a_refused_session_leaves_room_for_the_next() -> None:
     assert (by_eye.picture, by_eye.take_over) == (None, True)
 
 
+@pytest.mark.parametrize("enabled", [True, False])
 @pytest.mark.parametrize("accepts", [True, False])
-async def test_driving_is_enabled_or_the_refusal_said(accepts: bool) -> None:
-    async with served(PlayedClient(accepts=accepts)) as driver:
-        driver.enable()
+async def test_driving_is_enabled_or_disabled_or_the_refusal_said(accepts: bool, enabled: bool) -> None:
+    client = PlayedClient(accepts=accepts)
+    async with served(client) as driver:
+        driver.set_enabled(enabled)
         _, style = await note(driver)
+    assert client.switched == [enabled]
     assert style is (SeverityStyle.QUIET if accepts else SeverityStyle.BAD)
+
+
+@pytest.mark.parametrize(("enabled", "wanted"), [(True, "enabled"), (False, "disabled")])
+async def test_a_switch_without_an_answer_is_reported(enabled: bool, wanted: str) -> None:
+    async with served(PlayedClient(error=Unreachable("no answer"))) as driver:
+        driver.set_enabled(enabled)
+        text, style = await note(driver)
+    assert text.startswith(f"Driving is not {wanted}: no answer")
+    assert style is SeverityStyle.BAD
