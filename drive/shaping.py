@@ -54,10 +54,7 @@ def limited(wanted: Velocity, limits: Limits) -> Velocity:
 def supervised(wanted: Velocity, supervision: Supervision, picture_age_s: float, limits: Limits) -> Velocity:
     """Returns `wanted`, slowed down to what the driver can supervise."""
     linear_mps = supervised_limit_mps(supervision, picture_age_s, limits)
-    if supervision is Supervision.LINE_OF_SIGHT:
-        angular_rad_s = limits.line_of_sight_rad_s
-    else:
-        angular_rad_s = _within_one_age(limits.picture_turn_rad, picture_age_s)
+    angular_rad_s = supervised_limit_rad_s(supervision, picture_age_s, limits)
     return wanted.scaled(min(_factor(wanted.linear_mps, linear_mps), _factor(wanted.wz_rad_s, angular_rad_s)))
 
 
@@ -66,6 +63,13 @@ def supervised_limit_mps(supervision: Supervision, picture_age_s: float, limits:
     if supervision is Supervision.LINE_OF_SIGHT:
         return limits.line_of_sight_mps
     return _within_one_age(limits.picture_travel_m, picture_age_s)
+
+
+def supervised_limit_rad_s(supervision: Supervision, picture_age_s: float, limits: Limits) -> float:
+    """Returns the largest turning rate that the driver can supervise; infinite as the speed."""
+    if supervision is Supervision.LINE_OF_SIGHT:
+        return limits.line_of_sight_rad_s
+    return _within_one_age(limits.picture_turn_rad, picture_age_s)
 
 
 def approached(current: Velocity, target: Velocity, elapsed_s: float, limits: Limits) -> Velocity:

@@ -8,7 +8,7 @@ from google.protobuf.message import DecodeError
 from drive.episode import Episode
 from drive.machine import Enable, EndLease, Event, GrantLease, Reset, Rules, State, Stop, reset_obstacle
 from drive.phases import RESTING, Phase
-from drive.shaping import supervised_limit_mps
+from drive.shaping import supervised_limit_mps, supervised_limit_rad_s
 from drive.values import ZERO, Command, Inhibit, Latch, Lease, LeaseEnd, Supervision, Velocity
 from omniseer.drive.v1 import drive_pb2 as pb
 
@@ -156,6 +156,7 @@ def actual_state(
         vy_mps=output.vy_mps,
         wz_rad_s=output.wz_rad_s,
         speed_limit_mps=_speed_limit_mps(state, rules, now_ns),
+        turn_limit_rad_s=_turn_limit_rad_s(state, rules, now_ns),
         counters=counters,
         problems=problems,
         reset_obstacle=reset_obstacle(state, now_ns) if state.latch else "",
@@ -192,8 +193,18 @@ def _speed_limit_mps(state: State, rules: Rules, now_ns: int) -> float:
     """Returns the largest speed that the driver's way of seeing permits now."""
     if state.lease is None:
         return 0.0
-    picture_ns = state.command.picture_ns if state.command else 0
-    return supervised_limit_mps(state.lease.supervision, (now_ns - picture_ns) / 1e9, rules.limits)
+    return supervised_limit_mps(state.lease.supervision, _picture_age_s(state, now_ns), rules.limits)
+
+
+def _turn_limit_rad_s(state: State, rules: Rules, now_ns: int) -> float:
+    """Returns the largest turning rate that the driver's way of seeing permits now."""
+    if state.lease is None:
+        return 0.0
+    return supervised_limit_rad_s(state.lease.supervision, _picture_age_s(state, now_ns), rules.limits)
+
+
+def _picture_age_s(state: State, now_ns: int) -> float:
+    return (now_ns - (state.command.picture_ns if state.command else 0)) / 1e9
 
 
 def _latch_message(latch: Latch, since_ns: int) -> pb.Latch:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Final
 
 from drive.machine import EndLease, Event, GrantLease, Observe, Rules, State, Tick, step
-from drive.shaping import supervised_limit_mps
+from drive.shaping import supervised_limit_mps, supervised_limit_rad_s
 from drive.values import MS, ZERO, Command, LeaseEnd, Surroundings
 from simrobot.base import Base, Twist
 from simrobot.motion import Pose
@@ -66,12 +66,23 @@ class PracticeRobot:
 
     def speed_limit_mps(self, now_ns: int) -> float:
         """Returns the largest speed that the driver's way of seeing permits now; 0 without a driver."""
-        lease, command = self.state.lease, self.state.command
+        lease, limits = self.state.lease, self.rules.limits
         if lease is None:
             return 0.0
-        picture_age_s = (now_ns - (command.picture_ns if command else 0)) / 1e9
-        limit_mps = supervised_limit_mps(lease.supervision, picture_age_s, self.rules.limits)
-        return min(limit_mps, self.rules.limits.vx_mps)
+        limit_mps = supervised_limit_mps(lease.supervision, self._picture_age_s(now_ns), limits)
+        return min(limit_mps, limits.vx_mps)
+
+    def turn_limit_rad_s(self, now_ns: int) -> float:
+        """Returns the largest turning rate that it permits, likewise."""
+        lease, limits = self.state.lease, self.rules.limits
+        if lease is None:
+            return 0.0
+        limit_rad_s = supervised_limit_rad_s(lease.supervision, self._picture_age_s(now_ns), limits)
+        return min(limit_rad_s, limits.wz_rad_s)
+
+    def _picture_age_s(self, now_ns: int) -> float:
+        command = self.state.command
+        return (now_ns - (command.picture_ns if command else 0)) / 1e9
 
     def _surroundings(self, now_ns: int) -> Surroundings:
         return replace(

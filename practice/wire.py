@@ -89,6 +89,7 @@ def drive_state(robot: PracticeRobot, now_ns: int) -> results.DriveState:
         speed_limit_mps=robot.speed_limit_mps(now_ns),
         stop=stop(state, now_ns),
         problems=(),
+        turn_limit_rad_s=robot.turn_limit_rad_s(now_ns),
     )
 
 

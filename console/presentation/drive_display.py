@@ -131,6 +131,9 @@ def _bars(state: DriveState, limits: DriveLimits, supervision: Supervision) -> l
     bars = [SpeedBar("forward", "m/s", state.vx_mps, limits.max_vx_mps, min(most.vx_mps, now_mps))]
     if limits.max_vy_mps:
         bars.append(SpeedBar("left", "m/s", state.vy_mps, limits.max_vy_mps, min(most.vy_mps, now_mps)))
-    # Without a speed nothing turns, either.
-    turn_rad_s = most.wz_rad_s if now_mps else 0.0
-    return [*bars, SpeedBar("turn", "rad/s", state.wz_rad_s, limits.max_wz_rad_s, turn_rad_s)]
+    now_rad_s = state.turn_limit_rad_s
+    if now_rad_s is None:
+        # Not known of the picture; without a speed nothing turns, either.
+        now_rad_s = most.wz_rad_s if now_mps else 0.0
+    turn = SpeedBar("turn", "rad/s", state.wz_rad_s, limits.max_wz_rad_s, min(most.wz_rad_s, now_rad_s))
+    return [*bars, turn]

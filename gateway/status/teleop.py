@@ -117,6 +117,7 @@ class DriveActual:
     Attributes:
         session_id: of the lease; empty without one.
         velocity: published.
+        turn_limit_rad_s: as speed_limit_mps, of the turning rate; None of an older drive program.
         problems: of the base, for people.
         base_timeout_ms: silence after which the base stops by itself; None if it is not known.
         reset_obstacle: what keeps the stop from being reset, for people; empty when nothing does.
@@ -139,6 +140,7 @@ class DriveActual:
     base_timeout_ms: int | None = None
     reset_obstacle: str = ""
     enabled: bool | None = None
+    turn_limit_rad_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

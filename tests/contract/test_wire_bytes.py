@@ -586,7 +586,8 @@ ADDITIONS = [
         + uint(10, 140)
         + flt(11, 1.25)
         + sub(12, uint(1, 3))
-        + text(13, "no base"),
+        + text(13, "no base")
+        + flt(14, 0.5),
         {
             "monotonic_ns": 1 << 40,
             "newest_sequence": 7,
@@ -601,6 +602,7 @@ ADDITIONS = [
             "speed_limit_mps": 1.25,
             "stop": teleop_pb2.StopLatch(stop_id=3),
             "problems": ["no base"],
+            "turn_limit_rad_s": 0.5,
         },
     ),
     Case(

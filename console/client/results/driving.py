@@ -120,6 +120,9 @@ class DriveState:
     stop: StopLatch | None
     problems: tuple[str, ...]
     """What the drive program says of its base."""
+    turn_limit_rad_s: float | None
+    """As speed_limit_mps, of the turning rate. None of a robot of an earlier release, and while its drive
+    program does not answer."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -233,6 +233,7 @@ def report_from(welcome: pb.Welcome, message: pb.ActualState) -> DriveReport:
         session_id=message.session_id,
         velocity=same_fields(Velocity, message),
         speed_limit_mps=message.speed_limit_mps,
+        turn_limit_rad_s=message.turn_limit_rad_s if message.HasField("turn_limit_rad_s") else None,
         limits=same_fields(DriveLimits, welcome.limits),
         stop=same_fields(StopLatch, message.stop) if message.HasField("stop") else None,
         counters=same_fields(DriveCounters, message.counters),

@@ -90,6 +90,8 @@ def drive_state(facts: DriveFacts) -> pb.DriveResponse:
         state.vx_mps, state.vy_mps, state.wz_rad_s = velocity.vx_mps, velocity.vy_mps, velocity.wz_rad_s
         # A picture of this instant would permit any speed.
         state.speed_limit_mps = min(actual.speed_limit_mps, actual.limits.max_vx_mps)
+        if actual.turn_limit_rad_s is not None:
+            state.turn_limit_rad_s = min(actual.turn_limit_rad_s, actual.limits.max_wz_rad_s)
         state.problems.extend(actual.problems)
     # Also of a robot that does not answer: the driver needs the number to reset the stop.
     if stop := facts.drive.stop:

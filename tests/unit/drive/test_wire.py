@@ -103,6 +103,23 @@ def test_a_report_says_whether_anyone_may_drive_although_the_phase_is_stopped(en
     assert report.enabled is enabled
 
 
+@pytest.mark.parametrize(
+    ("supervision", "speed_mps", "turn_rad_s"),
+    [(Supervision.PICTURE, 0.10 / 0.58, 0.35 / 0.58), (Supervision.LINE_OF_SIGHT, 0.15, 0.4)],
+)
+def test_a_report_has_the_limits_by_which_the_motion_is_slowed_down(
+    supervision: Supervision, speed_mps: float, turn_rad_s: float
+) -> None:
+    now_ns = 10**12
+    command = Command("s", 1, True, Velocity(0.1), now_ns, now_ns, now_ns - 580_000_000)
+    state = State(phase=Phase.DRIVING, lease=Lease("s", "anna", supervision), command=command)
+    report = actual_state(
+        state, Rules(), now_ns, revision=1, counters=pb.Counters(), episode=None, problems=[]
+    )
+    assert report.speed_limit_mps == pytest.approx(speed_mps)
+    assert report.turn_limit_rad_s == pytest.approx(turn_rad_s)
+
+
 def test_the_welcome_has_the_limits_in_effect() -> None:
     rules = Rules(deadlines=Deadlines(picture_ns=300_000_000))
     limits = welcome("1", rules, 500).welcome.limits

@@ -99,6 +99,7 @@ def test_an_older_picture_slows_it_down(driver: Driver) -> None:
     driver.drives(0.54)
     assert 0 < driver.speed <= 0.1 / 0.54 + 0.01
     assert driver.robot.speed_limit_mps(driver.now_ns) == pytest.approx(0.1 / 0.54)
+    assert driver.robot.turn_limit_rad_s(driver.now_ns) == pytest.approx(0.35 / 0.54)
 
 
 def test_without_commands_it_stops_and_after_2_s_it_has_lost_its_driver(driver: Driver) -> None:
@@ -119,5 +120,6 @@ def test_without_a_driver_nothing_limits_and_nothing_moves(driver: Driver) -> No
     driver.robot.feed(EndLease("one", LeaseEnd.CLOSED), driver.now_ns)
     driver.drives(1.0)
     assert driver.robot.speed_limit_mps(driver.now_ns) == 0
+    assert driver.robot.turn_limit_rad_s(driver.now_ns) == 0
     assert driver.speed == 0
     assert driver.phase is Phase.AVAILABLE

@@ -39,6 +39,7 @@ LIMITS = {
 COMMAND_S = 0.3
 """What a command without hold-to-run moves; 0.5 s by default."""
 ROUNDING = 1e-6
+READY_WITHIN_S = 20.0
 
 
 @pytest.fixture(scope="module")
@@ -89,6 +90,9 @@ async def test_by_eye_it_is_driven_where_that_is_permitted(robot: DrivenRobot) -
         assert session.limits.line_of_sight
         assert session.limits.line_of_sight_mps == pytest.approx(SLOW_MPS)
         assert session.limits.line_of_sight_rad_s == pytest.approx(SLOW_RAD_S)
+        state = await session.ready(READY_WITHIN_S)
+        assert state.speed_limit_mps == pytest.approx(SLOW_MPS)
+        assert state.turn_limit_rad_s == pytest.approx(SLOW_RAD_S)
 
 
 @permits(legacy_clients=False)

@@ -94,6 +94,7 @@ class Robot:
             speed_limit_mps=0.0,
             stop=None,
             problems=(),
+            turn_limit_rad_s=0.0,
         )
 
 

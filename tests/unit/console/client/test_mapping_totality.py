@@ -323,6 +323,7 @@ PRESENCE: Final[Mapping[str, tuple[str, ...]]] = {
     "RecordingStateChanged.messages_lost": ("messages_lost",),
     "DriveState.stop": ("stop",),
     "DriveState.picture_age_ms": ("picture_age_ms",),
+    "DriveState.turn_limit_rad_s": ("turn_limit_rad_s",),
 }
 """Flag that may be down, or field that may be unset -> what is None then in the result of its message."""
 

@@ -25,6 +25,7 @@ STATE = DriveState(
     speed_limit_mps=0.3,
     stop=None,
     problems=(),
+    turn_limit_rad_s=2.97,
 )
 STOP = StopLatch(stop_id=7, by="bert", reason="lunch", age_ms=10)
 
@@ -55,11 +56,15 @@ def test_the_driver_sees_speeds_limits_and_ages() -> None:
 
 def test_what_the_picture_or_the_line_of_sight_permits_is_less() -> None:
     slow = own_display(
-        replace(STATE, speed_limit_mps=0.0), LIMITS, Supervision.PICTURE, state_age_s=0, ready=False
+        replace(STATE, speed_limit_mps=0.17, turn_limit_rad_s=0.6, picture_age_ms=580),
+        LIMITS,
+        Supervision.PICTURE,
+        state_age_s=0,
+        ready=False,
     )
-    assert [bar.now for bar in slow.bars] == [0, 0, 0]
+    assert [bar.now for bar in slow.bars] == [0.17, 0.17, 0.6]
     by_eye = own_display(
-        replace(STATE, speed_limit_mps=0.15, picture_age_ms=None),
+        replace(STATE, speed_limit_mps=0.15, turn_limit_rad_s=0.4, picture_age_ms=None),
         replace(LIMITS, max_vy_mps=0.0),
         Supervision.LINE_OF_SIGHT,
         state_age_s=0,
@@ -68,6 +73,18 @@ def test_what_the_picture_or_the_line_of_sight_permits_is_less() -> None:
     assert by_eye.driver == "You drive, by line of sight"
     assert [(bar.label, bar.now) for bar in by_eye.bars] == [("forward", 0.15), ("turn", 0.4)]
     assert "picture" not in by_eye.ages
+
+
+@pytest.mark.parametrize(("speed_mps", "turn_rad_s"), [(0.0, 0.0), (0.17, 0.8)])
+def test_an_earlier_robot_does_not_say_how_fast_it_may_turn(speed_mps: float, turn_rad_s: float) -> None:
+    shown = own_display(
+        replace(STATE, speed_limit_mps=speed_mps, turn_limit_rad_s=None),
+        LIMITS,
+        Supervision.PICTURE,
+        state_age_s=0,
+        ready=False,
+    )
+    assert [bar.now for bar in shown.bars] == [speed_mps, speed_mps, turn_rad_s]
 
 
 @pytest.mark.parametrize(

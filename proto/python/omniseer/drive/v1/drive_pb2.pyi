@@ -629,6 +629,7 @@ class ActualState(_message.Message):
     PROBLEMS_FIELD_NUMBER: _builtins.int
     RESET_OBSTACLE_FIELD_NUMBER: _builtins.int
     ENABLED_FIELD_NUMBER: _builtins.int
+    TURN_LIMIT_RAD_S_FIELD_NUMBER: _builtins.int
     MATCHED_FIELD_NUMBER: _builtins.int
     monotonic_ns: _builtins.int
     """The instant."""
@@ -654,6 +655,8 @@ class ActualState(_message.Message):
     """What keeps the stop from being reset, for people. Empty when nothing does, and without a stop."""
     enabled: _builtins.bool
     """Whether anyone may drive, whatever the phase says. Unset by a drive program of an earlier release."""
+    turn_limit_rad_s: _builtins.float
+    """Limit of the turning rate by the picture's age, in rad/s. Unset by a drive program of an earlier release."""
     matched: _builtins.int
     """How many subscriptions take the worker's velocities. In heartbeats to the guard alone."""
     @_builtins.property
@@ -696,15 +699,21 @@ class ActualState(_message.Message):
         problems: _abc.Iterable[_builtins.str] | None = ...,
         reset_obstacle: _builtins.str = ...,
         enabled: _builtins.bool | None = ...,
+        turn_limit_rad_s: _builtins.float | None = ...,
         matched: _builtins.int = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["_enabled", b"_enabled", "counters", b"counters", "enabled", b"enabled", "episode", b"episode", "stop", b"stop"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_enabled", b"_enabled", "_turn_limit_rad_s", b"_turn_limit_rad_s", "counters", b"counters", "enabled", b"enabled", "episode", b"episode", "stop", b"stop", "turn_limit_rad_s", b"turn_limit_rad_s"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_enabled", b"_enabled", "applied_revision", b"applied_revision", "command_ns", b"command_ns", "counters", b"counters", "enabled", b"enabled", "episode", b"episode", "inhibits", b"inhibits", "matched", b"matched", "monotonic_ns", b"monotonic_ns", "newest_sequence", b"newest_sequence", "phase", b"phase", "problems", b"problems", "reset_obstacle", b"reset_obstacle", "session_id", b"session_id", "speed_limit_mps", b"speed_limit_mps", "stop", b"stop", "vx_mps", b"vx_mps", "vy_mps", b"vy_mps", "wz_rad_s", b"wz_rad_s"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_enabled", b"_enabled", "_turn_limit_rad_s", b"_turn_limit_rad_s", "applied_revision", b"applied_revision", "command_ns", b"command_ns", "counters", b"counters", "enabled", b"enabled", "episode", b"episode", "inhibits", b"inhibits", "matched", b"matched", "monotonic_ns", b"monotonic_ns", "newest_sequence", b"newest_sequence", "phase", b"phase", "problems", b"problems", "reset_obstacle", b"reset_obstacle", "session_id", b"session_id", "speed_limit_mps", b"speed_limit_mps", "stop", b"stop", "turn_limit_rad_s", b"turn_limit_rad_s", "vx_mps", b"vx_mps", "vy_mps", b"vy_mps", "wz_rad_s", b"wz_rad_s"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__enabled: _TypeAlias = _typing.Literal["enabled"]  # noqa: Y015
     _WhichOneofArgType__enabled: _TypeAlias = _typing.Literal["_enabled", b"_enabled"]  # noqa: Y015
+    _WhichOneofReturnType__turn_limit_rad_s: _TypeAlias = _typing.Literal["turn_limit_rad_s"]  # noqa: Y015
+    _WhichOneofArgType__turn_limit_rad_s: _TypeAlias = _typing.Literal["_turn_limit_rad_s", b"_turn_limit_rad_s"]  # noqa: Y015
+    @_typing.overload
     def WhichOneof(self, oneof_group: _WhichOneofArgType__enabled) -> _WhichOneofReturnType__enabled | None: ...
+    @_typing.overload
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__turn_limit_rad_s) -> _WhichOneofReturnType__turn_limit_rad_s | None: ...
 
 Global___ActualState: _TypeAlias = ActualState  # noqa: Y015
 

@@ -413,6 +413,7 @@ class DriveState(_message.Message):
     SPEED_LIMIT_MPS_FIELD_NUMBER: _builtins.int
     STOP_FIELD_NUMBER: _builtins.int
     PROBLEMS_FIELD_NUMBER: _builtins.int
+    TURN_LIMIT_RAD_S_FIELD_NUMBER: _builtins.int
     monotonic_ns: _builtins.int
     """The monotonic clock of Ping when this was sent, in ns. Commands echo the newest."""
     newest_sequence: _builtins.int
@@ -435,6 +436,10 @@ class DriveState(_message.Message):
     """Age of the picture that the driver reported, in ms. Unset without one."""
     speed_limit_mps: _builtins.float
     """The speed limit that follows from the supervision now, in m/s."""
+    turn_limit_rad_s: _builtins.float
+    """The limit of the turning rate that follows from the supervision now, in rad/s. Unset by a robot of an earlier
+    release, and by one whose drive program does not answer.
+    """
     @_builtins.property
     def inhibits(self) -> _containers.RepeatedScalarFieldContainer[Global___DriveInhibit.ValueType]:
         """Why nothing moves; empty when nothing is in the way."""
@@ -463,14 +468,20 @@ class DriveState(_message.Message):
         speed_limit_mps: _builtins.float = ...,
         stop: Global___StopLatch | None = ...,
         problems: _abc.Iterable[_builtins.str] | None = ...,
+        turn_limit_rad_s: _builtins.float | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["_picture_age_ms", b"_picture_age_ms", "picture_age_ms", b"picture_age_ms", "stop", b"stop"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_picture_age_ms", b"_picture_age_ms", "_turn_limit_rad_s", b"_turn_limit_rad_s", "picture_age_ms", b"picture_age_ms", "stop", b"stop", "turn_limit_rad_s", b"turn_limit_rad_s"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_picture_age_ms", b"_picture_age_ms", "command_age_ms", b"command_age_ms", "inhibits", b"inhibits", "loop_age_ms", b"loop_age_ms", "monotonic_ns", b"monotonic_ns", "newest_sequence", b"newest_sequence", "phase", b"phase", "picture_age_ms", b"picture_age_ms", "problems", b"problems", "speed_limit_mps", b"speed_limit_mps", "stop", b"stop", "vx_mps", b"vx_mps", "vy_mps", b"vy_mps", "wz_rad_s", b"wz_rad_s"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_picture_age_ms", b"_picture_age_ms", "_turn_limit_rad_s", b"_turn_limit_rad_s", "command_age_ms", b"command_age_ms", "inhibits", b"inhibits", "loop_age_ms", b"loop_age_ms", "monotonic_ns", b"monotonic_ns", "newest_sequence", b"newest_sequence", "phase", b"phase", "picture_age_ms", b"picture_age_ms", "problems", b"problems", "speed_limit_mps", b"speed_limit_mps", "stop", b"stop", "turn_limit_rad_s", b"turn_limit_rad_s", "vx_mps", b"vx_mps", "vy_mps", b"vy_mps", "wz_rad_s", b"wz_rad_s"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__picture_age_ms: _TypeAlias = _typing.Literal["picture_age_ms"]  # noqa: Y015
     _WhichOneofArgType__picture_age_ms: _TypeAlias = _typing.Literal["_picture_age_ms", b"_picture_age_ms"]  # noqa: Y015
+    _WhichOneofReturnType__turn_limit_rad_s: _TypeAlias = _typing.Literal["turn_limit_rad_s"]  # noqa: Y015
+    _WhichOneofArgType__turn_limit_rad_s: _TypeAlias = _typing.Literal["_turn_limit_rad_s", b"_turn_limit_rad_s"]  # noqa: Y015
+    @_typing.overload
     def WhichOneof(self, oneof_group: _WhichOneofArgType__picture_age_ms) -> _WhichOneofReturnType__picture_age_ms | None: ...
+    @_typing.overload
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__turn_limit_rad_s) -> _WhichOneofReturnType__turn_limit_rad_s | None: ...
 
 Global___DriveState: _TypeAlias = DriveState  # noqa: Y015
 

@@ -52,8 +52,10 @@ def test_every_field_of_a_report_arrives() -> None:
     assert report.base_timeout_ms == welcome.base_timeout_ms
     assert wire.report_from(pb.Welcome(), message).base_timeout_ms is None
     assert report.enabled is True
-    message.ClearField("enabled")
-    assert wire.report_from(pb.Welcome(), message).enabled is None
+    assert report.turn_limit_rad_s == message.turn_limit_rad_s
+    for name in ("enabled", "turn_limit_rad_s"):
+        message.ClearField(name)
+        assert getattr(wire.report_from(pb.Welcome(), message), name) is None
     parts = (
         (report.limits, welcome.limits, DriveLimits),
         (report.stop, message.stop, StopLatch),
