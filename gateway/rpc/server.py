@@ -21,7 +21,7 @@ from gateway.config import GrpcSettings
 from gateway.rpc.calls.call import CallContext
 from gateway.rpc.calls.methods import CONTRACT, SERVICES, Method
 from gateway.rpc.interceptors.audit import Audit, AuditStart
-from gateway.rpc.interceptors.auth import Auth
+from gateway.rpc.interceptors.auth import Auth, Authorization
 from gateway.rpc.interceptors.caller_limit import CallerLimit
 from gateway.rpc.interceptors.exemption import Exemption
 from gateway.rpc.interceptors.presence import Presence
@@ -113,9 +113,10 @@ class Interceptors:
                 self.turns,  # before a stranger's call costs anything
                 Room(),  # of which a stop needs none
                 self.rate_limit,  # before any call costs anything
-                self.audit,  # records what auth and validation refuse
+                self.audit,  # records what those further in refuse
                 *([self.auth] if self.auth else []),
                 self.caller_limit,  # what all connections of that caller share
+                *([Authorization(self.auth)] if self.auth else []),  # whose refusals are of that share
                 TurnEnd(self.turns),  # once it is known who calls, and that it may
                 self.validation,
                 AuditStart(self.audit),  # records valid requests alone

@@ -91,6 +91,7 @@ def test_the_way_of_a_call_passes_the_interceptors_in_their_order() -> None:
         "errors": "ErrorInterceptor",
         "exemption": "Exemption",
         "room": "Room",
+        "authorization": "Authorization",
         "turn end": "TurnEnd",
         "audit start": "AuditStart",
     }

@@ -54,8 +54,8 @@ class CallContext(Call):
         method: as the schema describes it.
         peer: where the call comes from.
         principal: who makes it; None until `Auth` has found out, and where callers are not authenticated.
-        refusal: why `Auth` refuses the call, while the refusal is delayed and after, or why it has ended it;
-            None otherwise.
+        refusal: why `Auth` or `Authorization` refuses the call, while the refusal is delayed and after, or
+            why `Auth` has ended it; None otherwise.
         examined: whether it has one of its connection's turns (`Turns`).
         waited_s: how long it waited for that; 0 if it did not have to.
         unlimited: whether no limit applies to it: a stop, unless its caller shows no valid credential

@@ -34,7 +34,7 @@ _NOW_S: Final = 1.0
 
 
 class Audit(Interceptor[CallContext]):
-    """Records control actions, and those that `Auth`, one further in, refused.
+    """Records control actions, and those that `Auth` and `Authorization`, further in, refused.
 
     Args:
         events: operators see the actions there.

@@ -10,7 +10,7 @@ from typing import Any, Final, NoReturn
 
 import grpc
 
-from common.errors import NotAllowedError, NotAuthenticatedError, TooMuchError
+from common.errors import DomainError, NotAllowedError, NotAuthenticatedError, TooMuchError
 from common.grpc_errors import STATUS_CODES, metadata_of
 from common.interceptors import Interceptor, RpcContext
 from common.reasons import Reason
@@ -40,7 +40,7 @@ _REMEMBERED_CERTIFICATES: Final = 256
 
 
 class Auth(Interceptor[CallContext]):
-    """Refuses callers without a valid credential, or whose role does not suffice.
+    """Refuses callers without a valid credential. Their roles are examined further in, by `Authorization`.
 
     Args:
         authenticator: knows the credentials.
@@ -84,7 +84,6 @@ class Auth(Interceptor[CallContext]):
 
         Raises:
             NotAuthenticatedError: no valid credential was shown.
-            NotAllowedError: the method needs another role.
             TooMuchError: too many wrong credentials came from there, or all places are taken.
         """
         try:
@@ -92,14 +91,33 @@ class Auth(Interceptor[CallContext]):
             self._admit(call, principal.name)
         except (NotAuthenticatedError, TooMuchError) as error:
             self._dismiss(call)
-            call.refusal = error
-            await self._refusals.refuse(error, call.waited_s)
-        _authorize(principal, call.method)
+            await self._refuse(call, error)
         self._admitted[principal.credential_ids] = principal
         if call.method.streaming:
             task = asyncio.current_task()
             assert task is not None  # noqa: S101  # gRPC serves each call in a task of its own
             self._streams[call] = task
+
+    def authorize(self, call: CallContext) -> Awaitable[None] | None:
+        """Returns None if the role of an authenticated caller suffices.
+
+        Raises:
+            NotAllowedError: the method needs another role; from the awaitable, after a delay.
+        """
+        assert call.principal is not None  # noqa: S101  # on_call has set it
+        try:
+            _authorize(call.principal, call.method)
+        except NotAllowedError as error:
+            return self._refuse(call, error)
+        return None
+
+    def _refuse(self, call: CallContext, error: DomainError) -> Coroutine[Any, Any, NoReturn]:
+        """Returns what raises the error after a delay."""
+        call.refusal = error
+        if self._refusals.full:
+            # A place protects no connection that shows wrong credentials beside valid ones.
+            self._admission.note_excess(call.peer)
+        return self._refusals.refuse(error, call.waited_s)
 
     def _admit(self, call: CallContext, name: str) -> None:
         try:
@@ -250,6 +268,32 @@ class Auth(Interceptor[CallContext]):
             raise
         self._lockout.succeeded(prefix, owner)
         return principal
+
+
+class Authorization(Interceptor[CallContext]):
+    """Refuses callers whose role does not suffice.
+
+    Further in than `CallerLimit`: a refusal costs nearly as much as a response, and takes as much of the
+    caller's share.
+
+    Args:
+        auth: has authenticated the caller.
+    """
+
+    def __init__(self, auth: Auth) -> None:
+        self._auth = auth
+
+    def applies_to(self, method: Method) -> bool:
+        """Returns whether the method needs a credential."""
+        return self._auth.applies_to(method)
+
+    def on_call(self, call: CallContext) -> Awaitable[None] | None:
+        """Compares the caller's role with the method's.
+
+        Raises:
+            NotAllowedError: the method needs another role; from the awaitable, after a delay.
+        """
+        return self._auth.authorize(call)
 
 
 def token_of(rpc: RpcContext) -> str | None:

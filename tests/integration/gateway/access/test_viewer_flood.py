@@ -1,17 +1,22 @@
 """A viewer's token that calls as fast as it can: it is held to its share, and an operator does not notice."""
 
 import asyncio
+from collections import Counter
 from contextlib import AsyncExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import grpc
 import pytest
 
+from common.errors import DomainError
 from common.reasons import Reason
 from common.refusal import refusal_in
 from gateway.access.role import Role
+from gateway.access.token import new_token
+from gateway.rpc.connections.refusal_delay import RefusalDelay
+from gateway.rpc.interceptors.turns import EXAMINED
 from omniseer.gateway.v1.robot_gateway_pb2 import (
     GetSystemStatusRequest,
     SetPreviewModeRequest,
@@ -90,6 +95,66 @@ async def test_more_connections_get_a_viewer_no_more(tmp_path: Path) -> None:
     assert 40 <= sum(count for count, _ in found) <= 20 * (2 + took_s)
 
 
+async def refused(calling: Any) -> str:
+    """Why a call is refused; empty if it is not."""
+    try:
+        await calling
+    except grpc.aio.AioRpcError as error:
+        return refusal_in(error.trailing_metadata()).reason or error.code().name
+    return ""
+
+
+async def test_refusals_for_a_viewers_role_take_of_the_same_share(tmp_path: Path) -> None:
+    """The defect: a caller paid for none of them, and more connections got it more."""
+    robot = new_robot(tmp_path)
+    _, viewer = robot.add(Role.VIEWER, name="ben")
+    async with guarded_gateway(robot, limits={"caller_requests_per_s": 20}) as robot:
+        stubs: list[Any] = [RobotGatewayStub(robot.channel()) for _ in range(8)]
+        began_s = asyncio.get_running_loop().time()
+        calls = [
+            each.SetPreviewMode(SetPreviewModeRequest(), metadata=viewer.metadata(), timeout=60)
+            for each in stubs
+            for _ in range(40)
+        ]
+        reasons = Counter(await asyncio.gather(*map(refused, calls)))
+        took_s = asyncio.get_running_loop().time() - began_s
+    assert reasons.keys() == {Reason.ROLE_TOO_LOW, Reason.TOO_MANY_REQUESTS}
+    assert 40 <= reasons[Reason.ROLE_TOO_LOW] <= 20 * (2 + took_s)
+
+
+async def test_wrong_tokens_beside_a_valid_stream_are_delayed_like_a_strangers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    at_once, refuse = [], RefusalDelay.refuse
+
+    async def counted(self: RefusalDelay, error: DomainError, waited_s: float = 0.0) -> NoReturn:
+        at_once.append(self.full)
+        await refuse(self, error, waited_s)
+
+    monkeypatch.setattr(RefusalDelay, "refuse", counted)
+    # Longer than this test lasts.
+    monkeypatch.setattr("gateway.rpc.connections.admission.FORGIVEN_AFTER_S", 600.0)
+    robot = new_robot(tmp_path)
+    _, viewer = robot.add(Role.VIEWER, name="ben")
+    async with guarded_gateway(robot) as robot:
+        stub: Any = RobotGatewayStub(robot.channel())
+        stream = stub.WatchSystemStatus(WatchSystemStatusRequest(), metadata=viewer.metadata())
+        await stream.read()
+        wrong = Login(new_token("e" * 12).text()).metadata()
+
+        async def ping_wrongly() -> str:
+            return await refused(stub.GetSystemStatus(GetSystemStatusRequest(), metadata=wrong, timeout=60))
+
+        # The delay is full, as if others had filled it; then there is room for two turns of a connection.
+        monkeypatch.setattr("gateway.rpc.connections.refusal_delay._MAX_DELAYED", 0)
+        assert await ping_wrongly() == Reason.CREDENTIAL_UNKNOWN
+        monkeypatch.setattr("gateway.rpc.connections.refusal_delay._MAX_DELAYED", 2 * EXAMINED)
+        reasons = await asyncio.gather(*(ping_wrongly() for _ in range(8 * EXAMINED)))
+        assert set(reasons) == {Reason.CREDENTIAL_UNKNOWN, Reason.LOCKED_OUT}
+        assert at_once == [True] + [False] * 8 * EXAMINED
+        assert not stream.done()
+
+
 async def test_nor_more_streams_or_connections(tmp_path: Path) -> None:
     robot = new_robot(tmp_path)
     _, viewer = robot.add(Role.VIEWER, name="ben")
@@ -103,14 +168,7 @@ async def test_nor_more_streams_or_connections(tmp_path: Path) -> None:
             kept.append(channel)
             stream = stub.WatchSystemStatus(WatchSystemStatusRequest(), metadata=login.metadata(), timeout=30)
             kept.append(stream)
-            return await refused(stream)
-
-        async def refused(stream: Any) -> str:
-            try:
-                await stream.read()
-            except grpc.aio.AioRpcError as error:
-                return refusal_in(error.trailing_metadata()).reason
-            return ""
+            return await refused(stream.read())
 
         kept: list[Any] = []
         assert [await watch(viewer) for _ in range(4)] == ["", "", "", Reason.TOO_MANY_CONNECTIONS]
@@ -120,7 +178,11 @@ async def test_nor_more_streams_or_connections(tmp_path: Path) -> None:
             for _ in range(3)
         ]
         # Which of them comes last, gRPC does not promise.
-        assert sorted(await asyncio.gather(*map(refused, more))) == ["", "", Reason.TOO_MANY_STREAMS]
+        assert sorted(await asyncio.gather(*(refused(each.read()) for each in more))) == [
+            "",
+            "",
+            Reason.TOO_MANY_STREAMS,
+        ]
         assert await watch(operator) == ""
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import grpc
 import pytest
 
-from common.errors import NotAuthenticatedError, TooMuchError
+from common.errors import NotAllowedError, NotAuthenticatedError, TooMuchError
 from common.grpc_errors import ErrorInterceptor
 from common.reasons import Reason
 from gateway.access.authenticator import Authenticator
@@ -23,7 +23,7 @@ from gateway.config import LimitSettings
 from gateway.rpc.calls.call import CallContext
 from gateway.rpc.connections.admission import Admission
 from gateway.rpc.connections.refusal_delay import REFUSAL_DELAY_S, REFUSAL_SPACING_S, RefusalDelay
-from gateway.rpc.interceptors.auth import Auth
+from gateway.rpc.interceptors.auth import Auth, Authorization
 from tests.support.calls import call_of, serve
 from tests.support.virtual_time import in_virtual_time
 
@@ -209,6 +209,45 @@ async def test_refusals_wait_for_each_other_and_valid_callers_for_none(ground: G
     took_s = sorted(await asyncio.gather(*refused))
     assert took_s[0] >= REFUSAL_DELAY_S
     assert took_s[-1] == pytest.approx(REFUSAL_DELAY_S + 99 * REFUSAL_SPACING_S)
+
+
+@in_virtual_time
+async def test_a_role_that_does_not_suffice_is_refused_after_a_delay(ground: Ground) -> None:
+    async def answer(_request: Any, _call: CallContext) -> bytes:
+        return b"switched"
+
+    async def switch() -> Any:
+        interceptors = [ground.auth, Authorization(ground.auth)]
+        return await serve(interceptors, "SetPreviewMode", answer, token=ground.tokens["anna"].text())
+
+    loop = asyncio.get_running_loop()
+    began_s = loop.time()
+    with pytest.raises(NotAllowedError, match="needs operator"):
+        await switch()
+    assert loop.time() - began_s == pytest.approx(REFUSAL_DELAY_S)
+    ground.credentials["anna"] = replace(ground.credentials["anna"], role=Role.OPERATOR)
+    ground.reload()
+    assert await switch() == b"switched"
+
+
+async def test_wrong_tokens_that_can_not_be_delayed_restrain_a_connection_that_has_a_place(
+    ground: Ground, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The defect: a valid stream kept the place, and with it the way around turns and delays."""
+    monkeypatch.setattr("gateway.rpc.connections.refusal_delay._MAX_DELAYED", 0)
+    ground.tokens["eve"] = new_token("e" * 12)
+    restrained = []
+
+    async def answers(_request: Any, call: CallContext) -> Any:
+        restrained.append(ground.admission.is_restrained(call.peer))
+        with pytest.raises(NotAuthenticatedError):
+            await ground.ping("eve")
+        restrained.append(ground.admission.is_restrained(call.peer))
+        yield b"a status"
+
+    ground.admission.take_token(call_of().peer)
+    await serve([ground.auth], "WatchSystemStatus", answers, token=ground.tokens["anna"].text())
+    assert restrained == [False, True]
 
 
 @in_virtual_time
