@@ -12,12 +12,17 @@ from gateway.config import LimitSettings
 
 _BURST_S: Final = 2.0
 """A bucket holds what is refilled in this time."""
+MAX_OPEN_CALLS: Final = 512
+"""Of one caller, besides its streams: an eighth of what the gateway serves at once (`Room`). Calls last
+milliseconds: only a caller that withholds requests, over many connections, comes near it."""
 _MAX_IDLE: Final = 256
 """Buckets of callers that have called before; where there are more, the full ones are forgotten."""
+_RETRY_AFTER_S: Final = 1.0
+"""Suggested to a caller with too many open calls."""
 
 
 class CallerShares:
-    """Calls and open streams by caller: a name on credentials, or an address prefix without these. Pure.
+    """Requests, open calls and streams by caller: a name on credentials, else an address prefix. Pure.
 
     Args:
         limits: what a caller may have.
@@ -28,6 +33,8 @@ class CallerShares:
         self._limits = limits
         self._clock = clock
         self._buckets: dict[str, TokenBucket] = {}
+        self._calls: Counter[str] = Counter()
+        """Open ones that are no streams."""
         self._streams: Counter[str] = Counter()
 
     def take_token(self, caller: str) -> None:
@@ -49,6 +56,27 @@ class CallerShares:
                 Reason.TOO_MANY_REQUESTS,
                 (1 - bucket.tokens) / rate_per_s,
             )
+
+    def open_call(self, caller: str) -> None:
+        """Counts one more open call of the caller that is no stream.
+
+        Raises:
+            TooMuchError: it has as many as allowed.
+        """
+        if self._calls[caller] >= MAX_OPEN_CALLS:
+            raise TooMuchError(
+                f"{caller} has {self._calls[caller]} calls open, and no more are allowed; send each request "
+                "with its call, and wait for answers",
+                Reason.TOO_MANY_REQUESTS,
+                _RETRY_AFTER_S,
+            )
+        self._calls[caller] += 1
+
+    def close_call(self, caller: str) -> None:
+        """Counts one call less, after `open_call`."""
+        self._calls[caller] -= 1
+        if not self._calls[caller]:
+            del self._calls[caller]
 
     def open_stream(self, caller: str) -> None:
         """Counts one more stream of the caller.

@@ -1,4 +1,4 @@
-"""Limits of each caller: requests a second and open streams, over all of its connections."""
+"""Limits of each caller: requests a second, open calls and streams, over all of its connections."""
 
 from collections.abc import Awaitable
 
@@ -32,7 +32,7 @@ class CallerLimit(Interceptor[CallContext]):
         return method.needed is not Open.PUBLIC and not method.unlimited
 
     def on_call(self, call: CallContext) -> Awaitable[None] | None:
-        """Takes a token, and a stream if the call is one.
+        """Takes a token, and a place among the caller's open calls or streams.
 
         Raises:
             TooMuchError: there is none left; from the awaitable, after a delay.
@@ -44,6 +44,8 @@ class CallerLimit(Interceptor[CallContext]):
             self._shares.take_token(caller)
             if call.method.streaming:
                 self._shares.open_stream(caller)
+            else:
+                self._shares.open_call(caller)
         except TooMuchError as error:
             if self._refusals.full:
                 self._admission.note_excess(call.peer)
@@ -51,9 +53,13 @@ class CallerLimit(Interceptor[CallContext]):
         return None
 
     def on_end(self, call: CallContext, _error: BaseException | None) -> None:
-        """Gives the stream back."""
-        if call.method.streaming and _is_limited(call):
+        """Gives the place back."""
+        if not _is_limited(call):
+            return
+        if call.method.streaming:
             self._shares.close_stream(call.caller)
+        else:
+            self._shares.close_call(call.caller)
 
 
 def _is_limited(call: CallContext) -> bool:

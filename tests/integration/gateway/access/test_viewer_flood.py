@@ -15,6 +15,7 @@ from common.reasons import Reason
 from common.refusal import refusal_in
 from gateway.access.role import Role
 from gateway.access.token import new_token
+from gateway.rpc.calls.methods import CONTRACT
 from gateway.rpc.connections.refusal_delay import RefusalDelay
 from gateway.rpc.interceptors.turns import EXAMINED
 from omniseer.gateway.v1.robot_gateway_pb2 import (
@@ -184,6 +185,38 @@ async def test_nor_more_streams_or_connections(tmp_path: Path) -> None:
             Reason.TOO_MANY_STREAMS,
         ]
         assert await watch(operator) == ""
+
+
+async def test_requests_that_viewers_withhold_leave_room_for_operators(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The defect: two names, each over a few connections, took all the calls that the gateway serves."""
+    monkeypatch.setattr("gateway.rpc.interceptors.room.MAX_OPEN", 40)
+    monkeypatch.setattr("gateway.rpc.connections.caller_shares.MAX_OPEN_CALLS", 8)
+    robot = new_robot(tmp_path)
+    viewers = [robot.add(Role.VIEWER, name=name)[1] for name in ("ben", "carla")]
+    _, operator = robot.add(Role.OPERATOR)
+    path = f"/{CONTRACT.full_name}/GetSystemStatus"
+    async with guarded_gateway(robot) as robot:
+        withheld: list[Any] = [
+            channel.stream_unary(path)(metadata=login.metadata())
+            for login in viewers
+            for channel in (robot.channel(), robot.channel())
+            for _ in range(10)
+        ]
+        refusals = [asyncio.create_task(refused(each)) for each in withheld]
+        ended: list[str] = []
+        for each in asyncio.as_completed(refusals):
+            ended.append(await each)
+            if len(ended) == 2 * (20 - 8):
+                break
+        assert set(ended) == {Reason.TOO_MANY_REQUESTS}
+        calls: Any = RobotGatewayStub(robot.channel())
+        switch = SetPreviewModeRequest(enabled=False)
+        assert await refused(calls.SetPreviewMode(switch, metadata=operator.metadata(), timeout=10)) == ""
+        for call in withheld:
+            call.cancel()
+        await asyncio.wait(refusals)
 
 
 async def test_a_stop_finds_room_when_all_calls_of_the_gateway_are_taken(

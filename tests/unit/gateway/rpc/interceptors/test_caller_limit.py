@@ -14,9 +14,10 @@ from gateway.access.role import Role
 from gateway.config import LimitSettings
 from gateway.rpc.calls.methods import TELEOP, Method
 from gateway.rpc.connections.admission import FORGIVEN_AFTER_S, Admission
-from gateway.rpc.connections.caller_shares import CallerShares
+from gateway.rpc.connections.caller_shares import MAX_OPEN_CALLS, CallerShares
 from gateway.rpc.connections.refusal_delay import RefusalDelay
 from gateway.rpc.interceptors.caller_limit import CallerLimit
+from gateway.rpc.interceptors.room import MAX_OPEN
 from tests.support.calls import call_of
 from tests.support.clock import Clock
 from tests.support.virtual_time import in_virtual_time
@@ -78,6 +79,20 @@ def test_so_are_streams_until_they_end(ground: Ground) -> None:
     assert ground.call("anna", streaming=True)[1]
     ground.limit.on_end(opened[0][0], None)
     assert ground.call("ben", 7, streaming=True)[1]
+
+
+def test_so_are_other_calls_while_they_are_open(ground: Ground, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gateway.rpc.connections.caller_shares.MAX_OPEN_CALLS", 3)
+    opened = [ground.call("ben", port) for port in range(4)]
+    assert [served for _, served in opened] == [True] * 3 + [False]
+    assert ground.call("ben", 5, streaming=True)[1], "streams have a limit of their own"
+    assert ground.call("anna")[1]
+    ground.limit.on_end(opened[0][0], None)
+    assert ground.call("ben", 6)[1]
+
+
+def test_a_few_callers_can_not_take_all_the_calls_that_the_gateway_serves() -> None:
+    assert 4 * (MAX_OPEN_CALLS + LimitSettings().caller_streams) < MAX_OPEN
 
 
 @in_virtual_time
