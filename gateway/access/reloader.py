@@ -5,6 +5,7 @@ A list of credentials that stays unreadable may hide a revocation, so that no cr
 """
 
 import asyncio
+import logging
 import math
 import time
 from collections.abc import Callable, Mapping
@@ -18,7 +19,9 @@ from common.errors import UserError
 from gateway.access.command import credentials_command
 from gateway.access.directory import CredentialDirectory, KeyPairFiles, read_public
 from gateway.access.store import Store
-from gateway.status.access import AccessView, CertificateExpiry
+from gateway.status.access import AccessView, CertificateExpiry, UnreadFile
+
+_log = logging.getLogger(__name__)
 
 POLL_INTERVAL_S: Final = 0.5
 """Bounds how long a revoked credential remains usable."""
@@ -30,7 +33,11 @@ CLOSED_AFTER_S: Final = 60.0
 """How long the list of credentials may be unreadable before none is accepted."""
 _FAILURES_REPORTED: Final = 3
 """Consecutive failures before a fault: two files that belong together do not change at the same instant."""
-_DISK_HANGS: Final = "the list of credentials can't be read: the disk does not answer"
+_DISK_HANGS: Final = UnreadFile(
+    "the list of credentials can't be read: the disk does not answer",
+    "Check the disk of the list; to see its errors, type: sudo dmesg",
+    is_list=True,
+)
 _CERTIFICATES: Final = {
     "server_certificate": ("the gateway's certificate", "server"),
     "authority": ("the robot's certificate authority", "ca"),
@@ -152,7 +159,8 @@ class CredentialReloader:
         self._on_change = on_change
         self._seen = self._signatures()
         self.loaded = load_access(directory, tls)
-        self._error, self._failures = "", 0
+        self._unread: UnreadFile | None = None
+        self._failures = 0
         self._unconfirmed_since_s: float | None = None
         """When the first attempt began that has not shown yet that the list in effect is the newest."""
         self._polling = asyncio.Lock()
@@ -167,7 +175,8 @@ class CredentialReloader:
             while True:
                 # Apart from the polls: one on a disk that hangs does not end.
                 await asyncio.sleep(POLL_INTERVAL_S)
-                self._close_if_overdue(self._error or _DISK_HANGS)
+                unread = self._unread
+                self._close_if_overdue(unread if unread and unread.is_list else _DISK_HANGS)
 
     async def reload_for_unknown(self) -> None:
         """Returns after a poll that began after this call, because the credential may just have been added.
@@ -190,7 +199,7 @@ class CredentialReloader:
                 _certificate_expiry(which, ends_s, now_s, self._directory.path)
                 for which, ends_s in self.loaded.ends_s.items()
             ),
-            self._error,
+            self._unread,
             audit_error,
             closed=bool(self.loaded.problem),
         )
@@ -225,30 +234,37 @@ class CredentialReloader:
         try:
             store = await asyncio.to_thread(self._directory.read_store)
         except UserError as error:
-            self._note(error)
-            self._close_if_overdue(error.what)
+            unread = UnreadFile(error.what, error.remedy, is_list=True)
+            self._note(unread)
+            self._close_if_overdue(unread)
             return False
         try:
             loaded = await asyncio.to_thread(_with_certificates, store, self._tls)
         except UserError as error:
-            self._note(error)
+            self._note(UnreadFile(error.what, error.remedy, is_list=False))
             # A certificate that can't be read must not keep a revocation from taking effect.
             self._put_in_effect(replace(self.loaded, store=store, problem=""))
             return True
-        self._seen, self._error, self._failures = seen, "", 0
+        self._seen, self._unread, self._failures = seen, None, 0
         self._put_in_effect(loaded)
         return True
 
-    def _note(self, error: UserError) -> None:
+    def _note(self, unread: UnreadFile) -> None:
         self._failures += 1
-        if self._failures >= _FAILURES_REPORTED:
-            self._error = error.what
+        # One that has been reported is outdated by whatever is found now.
+        if self._failures >= _FAILURES_REPORTED or self._unread:
+            self._report(unread)
 
-    def _close_if_overdue(self, why: str) -> None:
+    def _report(self, unread: UnreadFile) -> None:
+        if unread != self._unread:
+            _log.error("access: %s", UserError(unread.why, unread.remedy))
+        self._unread = unread
+
+    def _close_if_overdue(self, unread: UnreadFile) -> None:
         since_s = self._unconfirmed_since_s
         if since_s is not None and time.monotonic() - since_s >= CLOSED_AFTER_S and not self.loaded.problem:
-            self._error = why
-            self._put_in_effect(replace(self.loaded, problem=why))
+            self._report(unread)
+            self._put_in_effect(replace(self.loaded, problem=unread.why))
 
     def _put_in_effect(self, loaded: LoadedAccess) -> None:
         if loaded != self.loaded:

@@ -23,18 +23,33 @@ class CertificateExpiry:
 
 
 @dataclass(frozen=True, slots=True)
+class UnreadFile:
+    """A changed file that can't be read, so that what it contains is not in effect.
+
+    Attributes:
+        why: what is wrong with it.
+        remedy: what to do or to type; empty if unknown.
+        is_list: whether it is the list of credentials; otherwise a certificate or its key.
+    """
+
+    why: str
+    remedy: str
+    is_list: bool
+
+
+@dataclass(frozen=True, slots=True)
 class AccessView:
     """The state at one instant.
 
     Attributes:
         certificates: those that TLS depends on.
-        credentials_error: why the newest credentials are not in force; empty if they are.
-        closed: whether no credential is accepted because of that error, which has lasted too long.
+        unread: what of the files is not in effect; None if all is.
         audit_error: why the audit log can't be written; empty if it can.
+        closed: whether no credential is accepted because the list could not be read for too long.
     """
 
     certificates: tuple[CertificateExpiry, ...] = ()
-    credentials_error: str = ""
+    unread: UnreadFile | None = None
     audit_error: str = ""
     closed: bool = False
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Final
 
-from gateway.status.access import AccessView
+from gateway.status.access import AccessView, UnreadFile
 from gateway.status.fault import Condition, Severity
 
 _COMPONENT: Final = "access"
@@ -28,15 +28,8 @@ def access_faults(access: AccessView, warn_days: float) -> Iterator[Condition]:
             f"{certificate.name} {'expired' if expired else 'expires'} on {certificate.ends_on}",
             certificate.remedy,
         )
-    if access.credentials_error:
-        yield Condition(
-            "access.credentials",
-            Severity.ERROR,
-            _COMPONENT,
-            f"changed credentials are not in force: {access.credentials_error}",
-            "Repair the file on the robot; until then the credentials that were read last apply, but "
-            "an unreadable list of credentials only for a minute: then every caller is refused",
-        )
+    if access.unread:
+        yield _not_in_effect(access.unread)
     if access.audit_error:
         yield Condition(
             "access.audit",
@@ -45,3 +38,21 @@ def access_faults(access: AccessView, warn_days: float) -> Iterator[Condition]:
             f"the audit log is not written: {access.audit_error}",
             "Free space on the robot's disk, or check the permissions of the file",
         )
+
+
+def _not_in_effect(unread: UnreadFile) -> Condition:
+    if unread.is_list:
+        what = "changed credentials are not in effect"
+        meanwhile = "those that were read last apply for a minute, then every caller is refused"
+    else:
+        what = "a changed certificate is not in effect"
+        meanwhile = "the one that was read last is used; changes of credentials take effect all the same"
+    # "On the robot, type: ..." where the remedy is "Type: ...".
+    remedy = f"On the robot, {unread.remedy[:1].lower()}{unread.remedy[1:]}" if unread.remedy else ""
+    return Condition(
+        "access.credentials",
+        Severity.ERROR,
+        _COMPONENT,
+        f"{what}: {unread.why}; {meanwhile}",
+        remedy or "Repair the file on the robot",
+    )

@@ -75,21 +75,26 @@ async def test_on_a_disk_that_hangs_unknown_credentials_share_one_poll(
 
 
 async def test_a_damaged_file_changes_nothing_and_is_reported_after_three_polls(
-    directory: CredentialDirectory,
+    directory: CredentialDirectory, caplog: pytest.LogCaptureFixture
 ) -> None:
     changes: list[LoadedAccess] = []
     reloader = CredentialReloader(directory, tls_of(directory), changes.append)
     before, text = reloader.loaded, directory.store_file.read_text()
     directory.store_file.write_text("damaged")
     problems = []
-    for _ in range(3):
+    for _ in range(4):
         await reloader.reload_for_unknown()
-        problems.append(reloader.view().credentials_error)
-    assert problems[:2] == ["", ""]
-    assert "is damaged" in problems[2]
+        problems.append(reloader.view().unread)
+    assert problems[:2] == [None, None]
+    assert problems[2]
+    assert "is damaged" in problems[2].why
+    assert "credentials init --again" in problems[2].remedy
+    assert problems[2].is_list
+    assert f"{problems[2].why}. {problems[2].remedy}" in caplog.text
+    assert len(caplog.records) == 1
     directory.store_file.write_text(text)
     await reloader.reload_for_unknown()
-    assert reloader.view().credentials_error == ""
+    assert reloader.view().unread is None
     assert (reloader.loaded, changes) == (before, [])
 
 
@@ -127,7 +132,10 @@ async def test_a_revocation_does_not_wait_for_a_certificate(directory: Credentia
         await reloader.reload_for_unknown()
     (change,) = changes
     assert change.store.credentials[credential.credential_id].revoked_s is not None
-    assert "certificate" in reloader.view().credentials_error
+    unread = reloader.view().unread
+    assert unread
+    assert "certificate" in unread.why
+    assert not unread.is_list
 
 
 def test_the_end_of_each_certificate_is_loaded(directory: CredentialDirectory) -> None:
@@ -216,12 +224,16 @@ async def test_half_a_rotation_changes_nothing_in_a_gateway_that_runs(
     for _ in range(3):
         await reloader.reload_for_unknown()
     assert (reloader.loaded, changes) == (before, [])
-    assert "was not issued by" in reloader.view().credentials_error
+    unread = reloader.view().unread
+    assert unread
+    assert "was not issued by" in unread.why
+    assert "credentials rotate server" in unread.remedy
+    assert not unread.is_list
     # What completes it may leave the gateway's files as they are.
     CredentialAdmin(directory, "lab").rotate_ca(None)
     await reloader.reload_for_unknown()
     assert len(changes) == 1
-    assert reloader.view().credentials_error == ""
+    assert reloader.view().unread is None
 
 
 def test_a_certificate_of_another_authority_needs_none_of_the_robots(

@@ -2,7 +2,7 @@
 
 import pytest
 
-from gateway.status.access import UNGUARDED, AccessView, CertificateExpiry
+from gateway.status.access import UNGUARDED, AccessView, CertificateExpiry, UnreadFile
 from gateway.status.fault import Severity
 from gateway.status.faults.access import access_faults
 
@@ -35,11 +35,31 @@ def test_a_certificate_is_a_fault_before_it_ends_and_a_worse_one_after(
     )
 
 
-def test_what_is_not_in_force_and_not_recorded_are_faults() -> None:
-    found = {each.fault_id: each for each in access_faults(AccessView((), "it is damaged", "disk full"), 14)}
-    assert found.keys() == {"access.credentials", "access.audit"}
-    assert "it is damaged" in found["access.credentials"].message
-    assert "disk full" in found["access.audit"].message
+@pytest.mark.parametrize(
+    ("is_list", "what", "meanwhile"),
+    [
+        (True, "changed credentials are not in effect", "every caller is refused"),
+        (False, "a changed certificate is not in effect", "changes of credentials take effect"),
+    ],
+)
+def test_what_is_not_in_effect_is_a_fault_with_what_to_type(is_list: bool, what: str, meanwhile: str) -> None:
+    unread = UnreadFile("it is damaged", "Type: chmod 600 it", is_list)
+    [found] = access_faults(AccessView((), unread), 14)
+    assert (found.fault_id, found.severity) == ("access.credentials", Severity.ERROR)
+    assert found.message.startswith(f"{what}: it is damaged")
+    assert meanwhile in found.message
+    assert found.remedy == "On the robot, type: chmod 600 it"
+
+
+def test_without_a_known_remedy_the_file_is_to_be_repaired() -> None:
+    [found] = access_faults(AccessView((), UnreadFile("it is larger than 1 MiB", "", is_list=True)), 14)
+    assert found.remedy == "Repair the file on the robot"
+
+
+def test_what_is_not_recorded_is_a_fault() -> None:
+    [found] = access_faults(AccessView(audit_error="disk full"), 14)
+    assert found.fault_id == "access.audit"
+    assert "disk full" in found.message
 
 
 def test_a_door_that_is_well_or_unguarded_is_no_fault() -> None:
