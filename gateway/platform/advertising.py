@@ -20,6 +20,8 @@ _FIRST_PAUSE_S: Final = 1.0
 _LONGEST_PAUSE_S: Final = 60.0
 _STOPS_WITHIN_S: Final = 2.0
 """It says goodbye to the network."""
+_DIES_WITHIN_S: Final = 1.0
+"""After a kill, which takes milliseconds, unless the process waits in a driver."""
 _GOOD_AFTER_S: Final = 60.0
 """A process that ran for so long failed for a new reason."""
 
@@ -90,4 +92,12 @@ async def _stop(child: asyncio.subprocess.Process) -> None:
     except TimeoutError:
         with suppress(ProcessLookupError):
             child.kill()
-        await child.wait()
+        try:
+            await within(_DIES_WITHIN_S, child.wait())
+        except TimeoutError:
+            # The gateway's end must not wait for it.
+            _log.warning(
+                "the process %d that advertises the gateway was killed, but the kernel holds it; "
+                "it ends when that lets it go, or with a restart of the computer",
+                child.pid,
+            )

@@ -11,6 +11,7 @@ from common.advertisement import Advertisement
 from gateway.platform import advertising
 from gateway.platform.advertiser import service
 from gateway.platform.hosts import advertised_addresses
+from tests.support.virtual_time import in_virtual_time
 from tests.support.waiting import wait_until
 
 WITHIN_S = 30.0
@@ -56,6 +57,46 @@ async def test_its_process_ends_with_the_task_even_if_it_hangs(
     # A process that is left behind fails the whole module.
     with pytest.raises(asyncio.CancelledError):
         await task
+
+
+class HeldProcess:
+    """A process that the kernel holds, as in a read of a disk that hangs: no signal ends it."""
+
+    pid = 4242
+    returncode = None
+
+    def __init__(self) -> None:
+        self.stderr = asyncio.StreamReader()
+        self.signals: list[str] = []
+
+    def terminate(self) -> None:
+        self.signals.append("terminate")
+
+    def kill(self) -> None:
+        self.signals.append("kill")
+
+    async def wait(self) -> None:
+        await asyncio.get_running_loop().create_future()
+
+
+@in_virtual_time
+async def test_a_process_that_a_kill_does_not_end_holds_up_no_end_of_the_gateway(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    started: asyncio.Future[HeldProcess] = asyncio.get_running_loop().create_future()
+
+    async def start(*_: str, **__: int) -> HeldProcess:
+        started.set_result(HeldProcess())
+        return started.result()
+
+    monkeypatch.setattr(asyncio, "create_subprocess_exec", start)
+    task = asyncio.create_task(advertising.advertise(LAB, 1, "127.0.0.1", ()))
+    process = await started
+    task.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await task
+    assert process.signals == ["terminate", "kill"]
+    assert "the process 4242 that advertises the gateway was killed" in caplog.text
 
 
 @pytest.mark.parametrize("name", ["lab", "lab ü.x\n", "x" * 300, "...", ""])
