@@ -10,6 +10,6 @@
 | expired, refused and strange ones, more than two a second for long | they wait, and others behind them |
 | the bridge ends before the gateway has answered | FAILED at the next start; not handed over again |
 
-What is trusted: nothing but the hub's own clock for ages (`ages.py`), and nothing for the rest. The bridge
-hands requests to the gateway, which decides once more, and carries them out.
+What is trusted: nothing but the hub's own clock for ages (`hub_time.py`), and nothing for the rest. The
+bridge hands requests to the gateway, which decides once more, and carries them out.
 """
