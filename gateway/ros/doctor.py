@@ -17,6 +17,7 @@ from common.ros_node import (
     share_directory,
 )
 from common.ros_transport_findings import transport_finding
+from common.start_command import messages_remedy
 from gateway.config import SourceSettings
 from gateway.ros.field_types import FieldMissingError, check_field
 from gateway.ros.publishers import publishers_of
@@ -108,7 +109,7 @@ def _type_finding(source: SourceSettings) -> Finding:
             check,
             f"{source.type} is this project's stand-in, for machines without the real package",
             "Messages of the real package can't be decoded with it",
-            "On a robot use the image with ROS packages: scripts/images build --ros packages",
+            messages_remedy(),
         )
     return good(check, f"{source.type} is installed")
 

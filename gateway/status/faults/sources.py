@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Final
 
+from common.start_command import messages_remedy
 from gateway.status.fault import Condition, Severity
 from gateway.status.source_view import SourceState, SourceView
 
@@ -23,7 +24,7 @@ STATE_FAULTS: Final[Mapping[SourceState, tuple[str, str] | None]] = {
     SourceState.FIELD_MISSING: ("field_missing", "Type on the robot: robot-gateway doctor"),
     SourceState.UNDECODABLE: (
         "undecodable",
-        "Install the robot's version of this message package beside the gateway",
+        f"Give the gateway the robot's version of this message package. {messages_remedy()}",
     ),
 }
 """Total: suffix of the fault id, and remedy; None for the state that is no fault. The message is the source's

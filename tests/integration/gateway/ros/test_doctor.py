@@ -6,6 +6,7 @@ from rclpy.qos import ReliabilityPolicy
 from sensor_msgs.msg import BatteryState
 
 from common.findings import Finding, Verdict
+from common.start_command import messages_remedy
 from gateway.config import DEFAULT_SOURCES, SourceSettings
 from gateway.ros import doctor
 from gateway.ros.doctor import ros_findings
@@ -73,4 +74,5 @@ def test_a_stand_in_is_named_and_its_topic_is_examined_all_the_same() -> None:
     finding = findings["type.detections"]
     assert finding.verdict is Verdict.NOTE
     assert finding.what.startswith("yolo_msgs/msg/DetectionArray is this project's stand-in")
+    assert finding.remedy == messages_remedy()
     assert "topic.detections" in findings

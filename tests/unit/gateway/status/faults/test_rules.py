@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from common.start_command import messages_remedy
 from gateway.config.faults import FaultSettings, LowerLimit, UpperLimit
 from gateway.status.board import Board, Publishers, Unusable
 from gateway.status.fault import Condition, Fault, Severity
@@ -157,6 +158,8 @@ def test_messages_that_cant_be_decoded() -> None:
     of.publishers[ODOMETRY] = Publishers(1)
     of.undecodable.add(ODOMETRY)
     assert set(found(snapshot(of, odometry=True))) == {"odometry.undecodable"}
+    _, remedy = STATE_FAULTS[SourceState.UNDECODABLE] or ("", "")
+    assert remedy.endswith(messages_remedy())
     of[ODOMETRY] = Received(Velocity(0, 0, 0), NOW_S)
     assert found(snapshot(of, odometry=True)) == {}, "a fresh value was decoded"
 
