@@ -1,7 +1,9 @@
 """The two ways between the event loop and other threads.
 
-GStreamer's threads only schedule calls on the loop, and calls that may block run in a thread of their own.
-Everything else in the service runs on the asyncio loop.
+GStreamer's threads look at the stream, and schedule calls on the loop for what follows; calls that may block
+run in a thread of their own. What a thread of SRT must decide by itself, because it can't wait for the loop
+(keyframe_gate.py, viewer_limit.py), is under a lock there. Everything else in the service runs on the asyncio
+loop.
 """
 
 import asyncio
