@@ -200,7 +200,7 @@ def test_a_login_is_all_that_goes_to_standard_output_and_works_on_a_laptop(
     assert "dora" in typed(guarded.deployment, LIST).stdout
 
 
-def test_it_is_healthy_by_a_socket_that_nobody_else_can_enter(guarded: Guarded) -> None:
+def test_it_is_healthy_by_a_socket_that_no_one_else_can_enter(guarded: Guarded) -> None:
     guarded.deployment.wait_healthy("gateway", "preview")
     last = guarded.deployment.inspect("gateway")["State"]["Health"]["Log"][-1]
     assert last["Output"].strip() == "unix:/tmp/health.sock: SERVING"
@@ -209,7 +209,7 @@ def test_it_is_healthy_by_a_socket_that_nobody_else_can_enter(guarded: Guarded) 
     assert (directory.st_mode & 0o7777, directory.st_uid) == (0o700, OWNER[0])
 
 
-def test_nobody_gets_in_who_is_not_known(guarded: Guarded) -> None:
+def test_no_unknown_caller_is_admitted(guarded: Guarded) -> None:
     robot, anna = guarded.deployment, guarded.anna
     foreign = new_ca("another robot", 1).certificate
     assert anna.token
@@ -292,7 +292,7 @@ def test_the_volumes_are_the_gateways_users_alone(guarded: Guarded) -> None:
             assert rights == (0o700 if path == inside else 0o600, *OWNER), path
 
 
-def test_a_gateway_that_was_broken_into_can_not_let_anybody_in(guarded: Guarded) -> None:
+def test_a_gateway_that_was_broken_into_can_add_no_credential(guarded: Guarded) -> None:
     robot = guarded.deployment
     touched = robot.run("exec", "gateway", "touch", str(CREDENTIALS / "credentials.json"), check=False)
     assert "Read-only file system" in touched.stderr

@@ -39,7 +39,7 @@ async def test_a_preview_service_that_is_not_there_is_a_fault_until_it_comes(tmp
     assert messages == [f"warning: {fault.message}", f"cleared: {fault.message}"]
 
 
-async def test_a_limit_that_the_computer_breaks_is_found_while_nobody_asks(
+async def test_a_limit_that_the_computer_breaks_is_found_without_a_call(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     async def log() -> str:

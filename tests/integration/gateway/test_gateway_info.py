@@ -32,7 +32,7 @@ async def test_calls_are_counted_by_what_became_of_them(operator: Operator) -> N
     assert info.gateway.client_count == 1
 
 
-async def test_it_tells_its_clock_and_what_it_is_configured_to(operator: Operator, tmp_path: Path) -> None:
+async def test_it_reports_its_clock_and_what_it_is_configured_to(operator: Operator, tmp_path: Path) -> None:
     before_ms = time.time_ns() // 1_000_000
     info = await operator.stub.GetGatewayInfo(GetGatewayInfoRequest(), timeout=5)
     assert before_ms <= info.wall_clock_unix_ms <= time.time_ns() // 1_000_000

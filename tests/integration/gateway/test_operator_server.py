@@ -29,7 +29,7 @@ async def operator(tmp_path: Path) -> AsyncIterator[Operator]:
         yield operator
 
 
-async def test_a_gateway_without_sources_is_healthy_and_tells_its_computer(operator: Operator) -> None:
+async def test_a_gateway_without_sources_is_healthy_and_reports_its_computer(operator: Operator) -> None:
     status = await eventually(operator.status, lambda it: it.platform.compute.available, "a platform sample")
     assert status.gateway_name == "lab"
     assert status.gateway_version

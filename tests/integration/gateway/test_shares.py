@@ -132,7 +132,7 @@ async def test_a_long_request_is_refused_with_a_reason(tmp_path: Path) -> None:
         (HEALTH, b"\x0a\x04nope", grpc.StatusCode.NOT_FOUND, Reason.UNKNOWN_SERVICE),
     ],
 )
-async def test_refusals_tell_programs_why(
+async def test_refusals_have_a_reason_for_programs(
     tmp_path: Path, method: str, request_bytes: bytes, code: grpc.StatusCode, reason: Reason
 ) -> None:
     async with running_gateway(tmp_path / "p.sock") as operator:
@@ -149,7 +149,7 @@ async def test_a_bad_field_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.timeout(180)
-async def test_a_stalled_reader_a_flood_and_many_watchers_slow_nobody(tmp_path: Path) -> None:
+async def test_a_stalled_reader_a_flood_and_many_watchers_slow_no_other(tmp_path: Path) -> None:
     """The benchmark has the figure; here it must only be far from a standstill."""
     async with running_gateway(tmp_path / "p.sock") as operator, AsyncExitStack() as stack:
         healthy, flooding = await connected(stack, operator), await connected(stack, operator)

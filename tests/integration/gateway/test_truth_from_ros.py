@@ -61,7 +61,7 @@ async def saying(talker: Talker, messages: dict[str, Any]) -> AsyncIterator[None
         await asyncio.gather(task, return_exceptions=True)
 
 
-async def test_the_command_is_attributed_to_whoever_asked_for_it(talker: Talker, operator: Operator) -> None:
+async def test_the_command_is_attributed_to_its_source(talker: Talker, operator: Operator) -> None:
     async with saying(talker, {KEYBOARD: command(0.5, 0.1), MUX: command(0.5, 0.1)}):
         status = await eventually(
             operator.status, lambda it: it.effective_command.active_source == "keyboard", "the keyboard"
@@ -75,7 +75,7 @@ async def test_the_command_is_attributed_to_whoever_asked_for_it(talker: Talker,
         )
 
 
-async def test_a_mux_that_obeys_somebody_else_is_attributed_to_nobody(
+async def test_a_mux_that_obeys_another_source_is_attributed_to_none(
     talker: Talker, operator: Operator
 ) -> None:
     async with saying(talker, {KEYBOARD: command(0.5), MUX: command(0.0)}):

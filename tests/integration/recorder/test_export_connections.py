@@ -305,7 +305,7 @@ async def test_a_call_with_another_key_gets_its_chunks_at_once(
     "settings", [{}, {"export": {"max_bytes_per_s": MIB}}], ids=["handed over", "over the call"]
 )
 @pytest.mark.usefixtures("patient")
-async def test_a_deleted_recording_is_closed_at_both_ends_though_nobody_reads(
+async def test_a_deleted_recording_is_closed_at_both_ends_though_it_is_not_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, settings: dict[str, Any]
 ) -> None:
     async with (

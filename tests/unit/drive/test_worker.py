@@ -143,7 +143,7 @@ def test_motion_ends_with_the_validity_of_the_last_command_and_not_a_cycle_later
     assert zero == pytest.approx(450, abs=1)
 
 
-def test_a_stop_while_nobody_drives_is_published_at_once(world: World) -> None:
+def test_a_stop_without_a_driver_is_published_at_once(world: World) -> None:
     world.at(5, Peer.JOINED)
     world.at(33, pb.ToDrive(stop=pb.Stop(by="ben")))
     world.end(60)

@@ -173,7 +173,7 @@ def test_exposure_can_be_accepted(tmp_path: Path) -> None:
         "{metrics: {host: 0.0.0.0, port: 9464}, security: {insecure: true}}",
     ],
 )
-def test_nothing_is_served_in_the_clear_beyond_the_loopback_unless_somebody_accepts_it(
+def test_nothing_is_served_in_the_clear_beyond_the_loopback_unless_that_is_accepted(
     tmp_path: Path, text: str
 ) -> None:
     with pytest.raises(UserError) as seen:

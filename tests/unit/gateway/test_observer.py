@@ -111,7 +111,7 @@ def test_another_live_camera_is_news_and_a_failed_one_a_fault() -> None:
     assert seen(live, failed) == [], "one that no one wants is no fault"
 
 
-def test_what_a_fault_tells_programs() -> None:
+def test_what_a_fault_says_to_programs() -> None:
     observer, board = new_observer(startup_grace_s=0.0), Board()
     raised = ((each, each.detail) for each in observer.observe(snapshot(board)))
     [(news, detail)] = [(each, detail) for each, detail in raised if isinstance(detail, FaultRaised)]
@@ -155,7 +155,7 @@ def test_a_mode_that_alternates_at_each_look_is_not_an_event_at_each() -> None:
     assert events <= BURST + 1
 
 
-def test_an_unreachable_service_is_news_and_worse_when_somebody_wants_it() -> None:
+def test_an_unreachable_service_is_an_event_and_worse_while_it_is_desired() -> None:
     observer = new_observer()
     observer.observe(snapshot(Board()))
     gone = replace(OFF, service_reachable=False)

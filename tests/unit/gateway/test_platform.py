@@ -68,14 +68,14 @@ def test_a_processor_that_is_clocked_down_is_throttled(tmp_path: Path, state: st
 
 
 @pytest.mark.parametrize(("bits", "expected"), [("0", False), ("50000", False), ("e0008", True), ("4", True)])
-def test_a_raspberry_pis_firmware_tells_what_is_now_not_what_was(
+def test_a_raspberry_pis_firmware_reports_what_is_now_not_what_was(
     tmp_path: Path, bits: str, expected: bool
 ) -> None:
     pi = tree(tmp_path, {"devices/platform/soc/soc:firmware/get_throttled": bits})
     assert compute.throttled(pi) is expected
 
 
-def test_a_machine_that_does_not_tell_is_not_said_to_be_cool(tmp_path: Path) -> None:
+def test_a_machine_that_does_not_report_it_is_not_said_to_be_cool(tmp_path: Path) -> None:
     fan = {"class/thermal/cooling_device0/type": "pwm-fan", "class/thermal/cooling_device0/cur_state": "4"}
     assert compute.throttled(tree(tmp_path, fan)) is None
 
@@ -120,7 +120,7 @@ def test_an_interface_that_lost_its_network_has_no_signal(tmp_path: Path) -> Non
     assert network.wireless("wlan0", tree(tmp_path, {"net/wireless": lost})) == (0, None)
 
 
-def test_a_wireless_interface_tells_signal_and_quality(tmp_path: Path) -> None:
+def test_a_wireless_interface_reports_signal_and_quality(tmp_path: Path) -> None:
     proc = tree(tmp_path, {"net/wireless": WIRELESS})
     assert network.wireless("wlan0", proc) == (70, -61)
     assert network.wireless("wlan01", proc) == (None, None)
@@ -155,7 +155,7 @@ def test_the_computers_battery_is_found_among_other_supplies(tmp_path: Path) -> 
     assert battery.read(tmp_path / "nothing") is None
 
 
-def test_a_battery_that_tells_little_is_not_made_up(tmp_path: Path) -> None:
+def test_a_battery_that_reports_little_is_not_made_up(tmp_path: Path) -> None:
     mute = {"class/power_supply/BAT0/type": "Battery", "class/power_supply/BAT0/status": "Unknown"}
     assert battery.read(tree(tmp_path, mute)) == Battery(True, None, None, None)
 

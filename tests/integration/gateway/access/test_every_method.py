@@ -188,7 +188,7 @@ async def test_a_token_beside_a_certificate_never_gives_more_than_either(tmp_pat
         )
 
 
-async def test_health_is_for_everybody_and_nothing_else_is(tmp_path: Path) -> None:
+async def test_health_needs_no_credential_and_all_else_does(tmp_path: Path) -> None:
     async with guarded_gateway(new_robot(tmp_path / "a")) as robot:
         check = raw_unary(robot.channel(), "/grpc.health.v1.Health/Check")
         answer = health_pb2.HealthCheckResponse.FromString(await check(b"", timeout=5))

@@ -130,7 +130,7 @@ async def test_viewers_leave_a_place_for_operators_and_one_for_the_bridge(tmp_pa
 
 
 @pytest.mark.timed
-async def test_who_takes_nothing_loses_the_place_and_is_told(
+async def test_a_caller_that_takes_nothing_loses_the_place_with_a_reason(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(export_stream, "STALLED_S", 1.0)

@@ -158,7 +158,7 @@ async def test_every_one_of_many_streams_learns_why_it_ended(tmp_path: Path) -> 
         assert reasons == {Reason.CREDENTIAL_REVOKED}
 
 
-async def test_a_stream_that_nobody_reads_ends_on_the_robots_side(tmp_path: Path) -> None:
+async def test_a_stream_that_is_not_read_ends_on_the_robots_side(tmp_path: Path) -> None:
     """Its caller learns nothing, but it costs the robot nothing any more."""
     robot = new_robot(tmp_path)
     credential, login = robot.add(Role.VIEWER)
@@ -236,7 +236,7 @@ async def test_a_hundred_revoked_streams_end_within_a_second(tmp_path: Path) -> 
         await keeps_async(1.0, "s until a hundred revoked streams have ended", took_s)
 
 
-async def test_callers_who_leave_while_they_are_sent_away_harm_nobody(tmp_path: Path) -> None:
+async def test_callers_that_leave_while_they_are_refused_harm_no_other(tmp_path: Path) -> None:
     robot = new_robot(tmp_path)
     credential, login = robot.add(Role.VIEWER)
     _, other = robot.add(Role.VIEWER, name="ben")
@@ -257,7 +257,7 @@ async def test_callers_who_leave_while_they_are_sent_away_harm_nobody(tmp_path: 
         await until(lambda: ping(stub(robot), login), Reason.CREDENTIAL_REVOKED)
 
 
-async def test_a_new_server_certificate_is_shown_and_nobody_is_cut_off(tmp_path: Path) -> None:
+async def test_a_new_server_certificate_is_shown_and_no_connection_is_cut_off(tmp_path: Path) -> None:
     robot = new_robot(tmp_path)
     _, login = robot.add(Role.VIEWER)
     async with guarded_gateway(robot):
@@ -400,7 +400,7 @@ def records_of(file: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in file.read_text().splitlines()]
 
 
-async def test_every_control_action_is_recorded_whoever_tries(tmp_path: Path) -> None:
+async def test_every_control_action_is_recorded_of_any_caller(tmp_path: Path) -> None:
     robot = new_robot(tmp_path)
     operator, login = robot.add(Role.OPERATOR)
     viewer, viewer_login = robot.add(Role.VIEWER, name="ben")

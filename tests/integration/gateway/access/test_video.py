@@ -40,7 +40,9 @@ def own_address() -> str:
     pytest.skip("this machine has no address but the loopback's")
 
 
-async def test_whoever_is_known_gets_the_passphrase_in_every_answer(tmp_path: Path, own_address: str) -> None:
+async def test_authenticated_callers_get_the_passphrase_in_every_answer(
+    tmp_path: Path, own_address: str
+) -> None:
     robot, double = new_robot(tmp_path / "c"), PreviewDouble()
     robot.admin.rotate_server((*HOSTS, own_address))
     robot.host = own_address
@@ -133,7 +135,9 @@ async def test_a_pending_request_is_not_answered_with_the_new_passphrase(tmp_pat
         await server.stop(None)
 
 
-async def test_where_nobody_is_asked_only_this_machine_gets_it(tmp_path: Path, own_address: str) -> None:
+async def test_where_no_credential_is_needed_only_this_machine_gets_it(
+    tmp_path: Path, own_address: str
+) -> None:
     double = PreviewDouble()
     server = await serve_double(tmp_path / "p.sock", double)
     port = free_tcp_port()

@@ -53,7 +53,7 @@ def test_guarantees_that_exclude_each_other(talker: Talker) -> None:
 
 
 @pytest.mark.usefixtures("talker")
-def test_nobody_publishes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_topic_without_publishers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor, "DISCOVERY_S", 0.5)
     findings = examined(ODOMETRY, BATTERY)
     assert findings["topic.odometry"].verdict is Verdict.WRONG, "it is required"

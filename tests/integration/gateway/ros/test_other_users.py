@@ -28,7 +28,7 @@ def environment_of_the_containers() -> dict[str, str]:
 
 
 @pytest.mark.parametrize("robots", [ORDINARY, ROOT_USER, GATEWAY])
-def test_the_gateway_hears_the_robots_nodes_whoever_they_run_as(
+def test_the_gateway_hears_the_robots_nodes_of_any_user(
     robots: tuple[int, int],
     ros_domain: int,  # noqa: ARG001  # for its effect
 ) -> None:

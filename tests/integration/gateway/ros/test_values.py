@@ -121,7 +121,7 @@ def test_a_name_that_is_not_utf8_is_shown_all_the_same(talker: Talker) -> None:
     assert found.value.items[0].class_name == "\ufffd\ufffdab"
 
 
-def test_a_message_that_is_not_one_harms_nobody(talker: Talker) -> None:
+def test_a_message_that_is_not_one_harms_nothing(talker: Talker) -> None:
     """Bytes that break off in the middle: the source counts a failure and reads on."""
     board = Board()
     with intake(DEFAULT_SOURCES, board) as running:

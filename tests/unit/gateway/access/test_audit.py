@@ -112,7 +112,7 @@ def test_a_full_disk_leaves_no_half_line_and_is_reported(
     assert log.lost == 10 - len(kept)
 
 
-def test_a_disk_that_hangs_holds_nobody_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_hangs_delays_no_caller(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     hangs, goes_on = threading.Event(), threading.Event()
 
     def append(_path: Path, _line: bytes) -> None:

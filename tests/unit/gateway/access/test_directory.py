@@ -38,7 +38,7 @@ def test_a_file_of_another_user_is_not_trusted(tmp_path: Path, monkeypatch: pyte
         assert seen.value.remedy.startswith("Type: chown ")
 
 
-def test_what_somebody_else_has_made_is_not_to_be_made_anew(tmp_path: Path) -> None:
+def test_what_another_user_has_made_is_not_to_be_made_anew(tmp_path: Path) -> None:
     with pytest.raises(UserError) as caught:
         KeyPairFiles(tmp_path / "bought.pem", tmp_path / "bought-key.pem", "server certificate").read()
     assert "No such file" in caught.value.what

@@ -143,7 +143,7 @@ def test_detection2d_without_any_hypothesis_is_still_a_box() -> None:
     assert (item.class_name, item.score, item.width_px) == ("", 0.0, 3)
 
 
-def test_a_battery_tells_percent() -> None:
+def test_a_battery_reports_percent() -> None:
     assert read(BATTERY, battery()) == Battery(True, 15.0, 50.0, False)
 
 
@@ -246,7 +246,7 @@ def test_a_command_that_is_no_number_is_none(place: int) -> None:
         (b"\xff", DiagnosticLevel.ERROR),
     ],
 )
-def test_diagnostics_tell_a_level_for_each_component(level: bytes, read_as: DiagnosticLevel) -> None:
+def test_diagnostics_report_a_level_for_each_component(level: bytes, read_as: DiagnosticLevel) -> None:
     found = read(DIAGNOSTICS, Thing(status=[Thing(name="drive", level=level, message="m")]))
     assert found.items == (DiagnosticItem("drive", read_as, "m"),)
 

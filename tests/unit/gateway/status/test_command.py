@@ -40,7 +40,7 @@ def test_one_that_spoke_earlier_is_not_guessed_at() -> None:
     assert giver(FORWARD, inputs) is None
 
 
-def test_what_nobody_asked_for_is_nobodys() -> None:
+def test_what_no_input_asked_for_is_attributed_to_none() -> None:
     assert giver(STOP, {KEYBOARD: Received(FORWARD, NOW_S)}) is None
     assert giver(STOP, {}) is None
 
@@ -58,7 +58,7 @@ def test_every_part_of_the_velocity_has_to_agree(part: str) -> None:
         assert giver(FORWARD, {KEYBOARD: Received(asked, NOW_S)}) is expected, off
 
 
-def test_a_mux_that_fell_silent_follows_nobody() -> None:
+def test_a_mux_that_fell_silent_follows_no_input() -> None:
     at_s = NOW_S - LIMIT_MS / 1000 - 0.01
     seen = effective_command(Received(STOP, at_s), {AUTONOMY: Received(STOP, at_s)}, LIMIT_MS, NOW_S)
     assert seen.freshness.stale
@@ -74,7 +74,7 @@ INPUTS = st.dictionaries(
 
 
 @given(emitted=st.builds(Received, VELOCITIES, st.floats(NOW_S - 1, NOW_S)), inputs=INPUTS)
-def test_whoever_is_named_spoke_last_lately_and_asked_for_it(
+def test_the_source_that_is_named_spoke_last_lately_and_asked_for_it(
     emitted: Received[Velocity], inputs: dict[CommandSource, Received[Velocity]]
 ) -> None:
     seen = effective_command(emitted, inputs, LIMIT_MS, NOW_S)

@@ -114,7 +114,7 @@ def test_if_strict_few_unused_connections_block_for_as_long_as_a_flood(
     assert block_s(blocklist, clock) == FLOOD_BLOCK_S
 
 
-def test_trust_is_told_and_ends(blocklist: Blocklist, clock: Clock) -> None:
+def test_trust_is_reported_and_ends(blocklist: Blocklist, clock: Clock) -> None:
     assert not blocklist.is_trusted(STRANGER)
     blocklist.note_admitted(STRANGER)
     assert blocklist.is_trusted(STRANGER)
@@ -124,7 +124,7 @@ def test_trust_is_told_and_ends(blocklist: Blocklist, clock: Clock) -> None:
     assert blocklist.trusted() == {"127.0.0.1", "::", "fe80::"}
 
 
-def test_of_too_many_trusted_addresses_the_newest_are_told(blocklist: Blocklist) -> None:
+def test_of_too_many_trusted_addresses_the_newest_are_reported(blocklist: Blocklist) -> None:
     for number in range(MAX_TRUSTED):
         blocklist.note_admitted(f"10.1.0.{number}")
     blocklist.note_admitted("10.1.0.0")

@@ -348,7 +348,7 @@ async def test_long_texts_are_shortened() -> None:
     assert len(ground.records.events[0].message) < 600
 
 
-def test_holds_without_end_are_folded_and_nobody_loses_what_was_moved() -> None:
+def test_holds_without_end_are_folded_and_keep_what_was_moved() -> None:
     """Sixty a second, as the pacing passes them: they must not displace what others did."""
     ground = Ground()
     episodes = Episodes(ground.audit)

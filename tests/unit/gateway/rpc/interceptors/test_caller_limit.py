@@ -134,7 +134,7 @@ def test_a_connection_whose_refusals_can_not_be_delayed_is_restrained_for_a_whil
 
 
 @given(st.lists(st.tuples(st.sampled_from(["anna", "ben", ""]), st.floats(0, 0.5)), max_size=200))
-def test_nobody_gets_more_than_the_share_whatever_the_others_do(asked: list[tuple[str, float]]) -> None:
+def test_no_caller_gets_more_than_its_share_whatever_the_others_do(asked: list[tuple[str, float]]) -> None:
     ground = Ground()
     served: dict[str, list[float]] = {}
     for number, (who, pause_s) in enumerate(asked):

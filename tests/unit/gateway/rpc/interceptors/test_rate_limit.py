@@ -181,7 +181,7 @@ def test_callers_that_leave_at_once_do_not_delay_others_for_ever() -> None:
 
 
 @given(st.lists(st.tuples(st.sampled_from("abcdef"), st.floats(0, 0.3)), max_size=200))
-def test_nobody_gets_more_than_the_share_whatever_the_others_do(asked: list[tuple[str, float]]) -> None:
+def test_no_caller_gets_more_than_its_share_whatever_the_others_do(asked: list[tuple[str, float]]) -> None:
     clock = Clock()
     admission = Admission(LimitSettings(connections=100, requests_per_s=10, burst=5), clock)
     served: dict[str, list[float]] = {}
