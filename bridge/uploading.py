@@ -100,6 +100,7 @@ class QueuedUploads:
         """Writes the fields about uploads into a status."""
         uploads = self._uploads
         status.uploads_waiting = len(uploads.waiting)
+        status.uploads_left_out = uploads.left_out
         status.uploads_paused = uploads.disk_error or uploads.paused
         if current := uploads.current:
             status.uploading_id = current.recording_id
@@ -149,7 +150,10 @@ class QueuedUploads:
 
     async def cancel(self, recording_id: str) -> recording_pb.RecordingCopy:
         """Takes a recording from the queue; raises a DomainError."""
-        return _copy(await self._uploads.cancel(recording_id))
+        try:
+            return _copy(await self._uploads.cancel(recording_id))
+        except GatewayError as error:
+            raise _no_answer(error) from error
 
 
 async def apply_rule(uploads: "Uploads", gateway: GatewayCalls) -> None:
@@ -158,12 +162,12 @@ async def apply_rule(uploads: "Uploads", gateway: GatewayCalls) -> None:
     while True:
         try:
             token = ""
-            uploads.unconfirmed.begin_listing()
+            uploads.begin_listing()
             for _ in range(_MOST_PAGES):
                 page = await gateway.list_recordings(_PAGE, token)
                 await uploads.consider(page.recordings)
                 if not (token := page.next_page_token):
-                    uploads.unconfirmed.end_listing()
+                    uploads.end_listing()
                     break
         except GatewayError as error:
             _log.info("the robot's recordings can't be listed: %s", error)

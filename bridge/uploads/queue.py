@@ -16,7 +16,7 @@ from types import MappingProxyType
 from typing import Final, Protocol
 
 MOST_WAITING: Final = 1000
-"""Recordings in the queue; further ones are refused."""
+"""Recordings in the queue; a further one is refused, or takes the place of a less urgent one."""
 MOST_KEPT: Final = 10_000
 """Recordings of which it is remembered that they are verified; the oldest are forgotten first."""
 FIRST_PAUSE_S: Final = 1.0
@@ -282,3 +282,9 @@ def in_order(uploads: Iterable[Upload]) -> list[Upload]:
     """Returns those that run or wait, the one that runs first and then the most urgent."""
     waiting = (each for each in uploads if each.state in WAITING)
     return sorted(waiting, key=lambda each: (each.state not in RUNNING, each.order))
+
+
+def last_to_run(uploads: Iterable[Upload]) -> Upload | None:
+    """Returns the last in order of those that wait and do not run; None if there is none."""
+    waiting = (each for each in uploads if each.state in WAITING - RUNNING)
+    return max(waiting, key=lambda each: each.order, default=None)

@@ -8,6 +8,7 @@
 | gateway, hub or store fail | FAILED; all wait 1, 2, 4 ... 300 s, and from 1 s again after progress |
 | they fail three times at one recording, without progress | as a failure of that one: others go on |
 | the recording is deleted on the robot | it leaves the queue |
+| the queue is full | a more urgent recording takes the last one's place, which competes for one again |
 | the bridge's disk fails | the queue goes on in memory; `disk_error` says why; a new request is refused |
 | the queue on the disk is lost | what the recorder expects to be copied is queued again |
 """
@@ -24,6 +25,7 @@ from bridge.uploads import gates
 from bridge.uploads.attempt import Attempt, Parties, RecordingSource, ended
 from bridge.uploads.config import UploadSettings
 from bridge.uploads.gates import Conditions
+from bridge.uploads.left_out import LeftOut
 from bridge.uploads.parts import PartSender
 from bridge.uploads.problems import AttemptError, CutError, GoneError
 from bridge.uploads.queue import (
@@ -39,6 +41,7 @@ from bridge.uploads.queue import (
     Upload,
     UploadStore,
     in_order,
+    last_to_run,
     next_upload,
     progressed,
     step,
@@ -126,6 +129,7 @@ class Uploads:
         self._sent = deque[tuple[float, int]](maxlen=_RATE_TICKS)
         self.unconfirmed = Unconfirmed()
         """Those that the recorder may not have as they are."""
+        self._left_out = LeftOut()
         self.loaded = asyncio.Event()
         """Set once the queue has been read from the disk, or that has failed."""
         self.paused = ""
@@ -155,6 +159,11 @@ class Uploads:
         return self._uploads.get(self._running[0]) if self._running else None
 
     @property
+    def left_out(self) -> int:
+        """Recordings that are to be copied and find no place in the queue, as the last list has them."""
+        return self._left_out.count
+
+    @property
     def bytes_per_s(self) -> int:
         """Bytes a second that are sent at present."""
         if len(self._sent) < 2:
@@ -178,13 +187,15 @@ class Uploads:
         """
         await self.loaded.wait()
         recording = await self._look_up(recording_id)
+        if not ended(recording):
+            raise PreconditionError(f"{recording_id} has not ended", Reason.RECORDING_RUNS)
         upload = self._uploads.get(recording_id) or _new(recording, Priority.BY_HAND)
         if upload.state is State.VERIFIED and _differs(upload, recording):
             upload = step(upload, Event.CHANGED, self._now_s)
         else:
             upload = step(upload, Event.ENQUEUE, self._now_s)
         upload = replace(upload, priority=min(upload.priority, Priority.BY_HAND))
-        if upload.state in WAITING and not self._has_room_for(recording_id):
+        if upload.state in WAITING and not self._has_room_for(upload):
             raise TooMuchError(f"{MOST_WAITING} recordings wait to be uploaded", Reason.TOO_MANY_REQUESTS)
         is_new = recording_id not in self._uploads
         self._put(upload)
@@ -194,6 +205,7 @@ class Uploads:
             if is_new:
                 self._drop(recording_id)
             raise TooMuchError(f"the bridge's disk can't be written: {error}", Reason.DISK_FULL) from error
+        await self._displace()
         # An operator who asks again does not wait for the end of a pause.
         self._path_due_s = 0.0
         self._wake.set()
@@ -206,10 +218,11 @@ class Uploads:
             The upload as it was.
 
         Raises:
+            GatewayError: It is not in the queue, and the gateway does not answer whether it is to be.
             NotFoundError: It is not in the queue.
         """
         await self.loaded.wait()
-        upload = self._uploads.get(recording_id)
+        upload = self._uploads.get(recording_id) or await self._without_place(recording_id)
         if upload is None or upload.state is State.LOCAL:
             raise NotFoundError(f"{recording_id} is not in the queue of uploads", Reason.RECORDING_NOT_FOUND)
         if upload.state is not State.VERIFIED:
@@ -218,28 +231,47 @@ class Uploads:
             self._wake.set()
         return upload
 
+    def begin_listing(self) -> None:
+        """Takes that the recorder's list is read from its beginning: each page of it goes to `consider`."""
+        self.unconfirmed.begin_listing()
+        self._left_out.begin_listing()
+
     async def consider(self, recordings: Iterable[results.Recording]) -> None:
         """Takes recordings of the recorder's list, and queues those that have ended and are to be copied.
 
         Those are what the rule selects, and what the recorder expects to be copied although it is not in the
-        queue: that was lost with the bridge's disk.
+        queue: that was lost with the bridge's disk, or has lost its place. The list begins with the newest:
+        once the queue is full, those that go before others take the places of the last ones.
         """
         await self.loaded.wait()
-        room = self._room
-        for recording in sorted(recordings, key=lambda each: each.started_unix_ms):
+        wanted = []
+        for recording in recordings:
             known = self._uploads.get(recording.id)
             if known:
                 self.unconfirmed.listed(recording.id, confirmed=_is_known(known, recording.copy))
             if not ended(recording):
                 continue
             selected = _selects(self._settings.rule, recording)
-            if known is None and _is_wanted(recording, selected=selected) and room > 0:
+            if known is None and _is_wanted(recording, selected=selected):
                 lowest = Priority.OTHER if selected else Priority.BY_HAND
-                await self._keep(step(_new(recording, lowest), Event.ENQUEUE, self._now_s))
-                room = self._room
+                wanted.append(step(_new(recording, lowest), Event.ENQUEUE, self._now_s))
             elif known and selected and known.state is State.VERIFIED and _differs(known, recording):
-                await self._keep(step(known, Event.CHANGED, self._now_s))
+                wanted.append(step(known, Event.CHANGED, self._now_s))
+        for upload in sorted(wanted, key=lambda each: each.order):
+            await self._admit(upload)
         self._wake.set()
+
+    def end_listing(self) -> None:
+        """Takes that the recorder's list was read to its end."""
+        self.unconfirmed.end_listing()
+        if self._left_out.end_listing():
+            if count := self.left_out:
+                _log.warning(
+                    "%d recordings are to be copied and find no place: %d wait already", count, MOST_WAITING
+                )
+            else:
+                _log.info("all recordings that are to be copied have a place in the queue again")
+            self._changed()
 
     async def run(self, stop: asyncio.Event) -> None:
         """Uploads until `stop`; what is being sent then goes on where it was, after the next start.
@@ -410,14 +442,41 @@ class Uploads:
 
     async def _look_up(self, recording_id: str) -> results.Recording:
         try:
-            recording = await self._source.recording(recording_id)
+            return await self._source.recording(recording_id)
         except Refused as error:
             if error.reason != Reason.RECORDING_NOT_FOUND:
                 raise
             raise NotFoundError(f"there is no recording {recording_id}", Reason.RECORDING_NOT_FOUND) from None
-        if not ended(recording):
-            raise PreconditionError(f"{recording_id} has not ended", Reason.RECORDING_RUNS)
-        return recording
+
+    async def _without_place(self, recording_id: str) -> Upload | None:
+        """Queues a recording that is not in the queue, if the recorder expects its copy; otherwise None."""
+        recording = await self._look_up(recording_id)
+        if not ended(recording) or not _is_wanted(recording, selected=False):
+            return None
+        upload = step(_new(recording), Event.ENQUEUE, self._now_s)
+        return self._uploads.setdefault(recording_id, upload)
+
+    async def _admit(self, upload: Upload) -> None:
+        """Queues a recording; in a full queue in the place of the last one, if that runs after it."""
+        known = self._uploads.get(upload.recording_id)
+        if known and known.state is not State.VERIFIED:
+            return  # Queued or cancelled by hand, while another row was written.
+        last = last_to_run(self._uploads.values()) if self._room <= 0 else None
+        if self._room <= 0 and (last is None or last.order < upload.order):
+            self._left_out.add(upload.recording_id)
+            return
+        self._left_out.remove(upload.recording_id)
+        await self._keep(upload)
+        await self._displace()
+
+    async def _displace(self) -> None:
+        """Takes the last ones of more than MOST_WAITING from the queue.
+
+        The recorder goes on sparing those that it knows of, and its next list has them as wanted.
+        """
+        while self._room < 0 and (last := last_to_run(self._uploads.values())):
+            self._left_out.add(last.recording_id)
+            await self._forget(last.recording_id)
 
     async def _apply(self, recording_id: str, event: Event, reason: str = "") -> None:
         """Changes an upload; not one that was cancelled, or has gone, while another row was written."""
@@ -478,9 +537,13 @@ class Uploads:
     def _oldest_settled(self) -> str | None:
         return next((key for key, each in self._uploads.items() if each.state not in WAITING), None)
 
-    def _has_room_for(self, recording_id: str) -> bool:
-        known = self._uploads.get(recording_id)
-        return (known is not None and known.state in WAITING) or self._room > 0
+    def _has_room_for(self, upload: Upload) -> bool:
+        known = self._uploads.get(upload.recording_id)
+        if (known is not None and known.state in WAITING) or self._room > 0:
+            return True
+        # Of two requests by hand the earlier one keeps its place.
+        last = last_to_run(self._uploads.values())
+        return last is not None and upload.priority < last.priority
 
     @property
     def _room(self) -> int:

@@ -208,6 +208,13 @@ def cloud_findings(status: SystemStatus) -> Iterator[Finding]:
     if cloud.uploads_waiting and cloud.uploads_paused:
         what = f"{cloud.uploads_waiting} recordings wait to be copied: {cloud.uploads_paused}"
         yield note("fleet.uploads", what, "They are on the robot alone")
+    if cloud.uploads_left_out:
+        yield note(
+            "fleet.queue",
+            f"{cloud.uploads_left_out} recordings are to be copied and find no place in the full queue",
+            "They wait for one; the robot may delete them before, the oldest first, when its disk is full",
+            "Let it upload more (uploads of the robot's bridge.yaml), or export them: robotctl record list",
+        )
 
 
 def access_finding(status: SystemStatus) -> Finding | None:

@@ -35,7 +35,8 @@ def copy_text(copy: RecordingCopy, whole: int = 0) -> str:
 def _uploads(status: CloudStatus, *, compact: bool) -> str:
     if status.state is CloudState.UNREACHABLE or not status.uploads_waiting:
         return ""
-    waiting = plural(status.uploads_waiting, "recording") + " to copy"
+    beyond = f" and {status.uploads_left_out} more without a place" if status.uploads_left_out else ""
+    waiting = plural(status.uploads_waiting, "recording") + f" to copy{beyond}"
     if status.uploading is None:
         return joined(waiting, status.uploads_paused)
     far = copy_text(status.uploading, status.uploading_size)

@@ -57,4 +57,6 @@ def of_cloud(view: CloudView, now_s: float, bridge: BridgeMetrics) -> Iterator[M
         yield gauge("cloud_last_sent_age_seconds", "Age of the newest acknowledgement.", age_s)
     waiting = "Recordings that wait to be copied or are being copied."
     yield gauge("uploads_waiting", waiting, status.uploads_waiting)
+    left_out = "Recordings that are to be copied and find no place in the full queue."
+    yield gauge("uploads_left_out", left_out, status.uploads_left_out)
     yield gauge("upload_bytes_per_second", "Sent of a recording at present.", status.upload_bytes_per_s)

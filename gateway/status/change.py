@@ -93,6 +93,7 @@ def _cloud(view: CloudView | None) -> object:
         status.uploading_id,
         status.uploading.state if status.uploading else None,
         status.uploads_paused,
+        status.uploads_left_out,
         status.last_error,
     )
 

@@ -116,6 +116,7 @@ class CloudStatus:
     upload_bytes_per_s: int = 0
     uploads_paused: str = ""
     last_error: str = ""
+    uploads_left_out: int = 0
 
 
 @dataclass(frozen=True, slots=True)

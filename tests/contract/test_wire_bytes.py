@@ -1124,6 +1124,7 @@ CLOUD_STATUS = numbered(
     (15, "upload_bytes_per_s", 1 << 41),
     (16, "uploads_paused", "at night"),
     (17, "last_error", "gone"),
+    (18, "uploads_left_out", 4),
 )
 CLOUD_CHANGED = numbered(
     event_pb2.CloudStateChanged, (1, "state", cloud_pb2.CLOUD_STATE_REFUSED), (2, "last_error", "revoked")

@@ -57,5 +57,6 @@ def uploading_view(at_s: float) -> CloudView:
         upload_bytes_per_s=1_000_003,
         uploads_paused="not charging",
         last_error="no route to the hub",
+        uploads_left_out=4,
     )
     return view(status, at_s)

@@ -51,6 +51,8 @@ class CloudStatus:
     """Why no recording is copied although some wait; else empty."""
     last_error: str
     """Why the hub is not reached or the bridge can't work, and what to do; else empty."""
+    uploads_left_out: int
+    """Recordings that are to be copied and find no place in the full queue."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

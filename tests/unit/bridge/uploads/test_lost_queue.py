@@ -99,4 +99,4 @@ async def test_a_full_queue_is_not_sorted_for_each_recording_of_the_list(
         monkeypatch.setattr(uploads, "in_order", counted)
         await running.uploads.consider(robot.recordings.values())
         assert sorted_times < 10
-        assert len(running.uploads.waiting) == 50
+        assert [each.recording_id for each in running.uploads.waiting] == sorted(robot.recordings)[:50]

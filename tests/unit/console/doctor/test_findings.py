@@ -268,5 +268,8 @@ def test_a_robot_of_a_fleet_says_whether_it_is_connected(double: GatewayDouble) 
     away = examined(double)
     assert (away["fleet"].verdict, "(7)" in away["fleet"].why) == (Verdict.NOTE, True)
     assert "not charging" in away["fleet.uploads"].what
+    assert "fleet.queue" not in away
+    cloud.uploads_left_out = 3
+    assert "3 recordings" in examined(double)["fleet.queue"].what
     double.status.faults.add(id="cloud.offline", severity=FAULT_SEVERITY_WARNING, active=True)
     assert "fleet" not in examined(double), "the fault says it"

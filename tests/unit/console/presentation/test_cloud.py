@@ -51,6 +51,12 @@ def test_one_that_is_not_says_what_waits_and_why() -> None:
     )
 
 
+def test_recordings_that_find_no_place_in_the_queue() -> None:
+    found = row(state=cloud_pb2.CLOUD_STATE_CONNECTED, uploads_waiting=1000, uploads_left_out=12)
+    assert found
+    assert found.text == "lab-1, fleet lab, 1000 recordings to copy and 12 more without a place"
+
+
 def test_a_copy_on_its_way() -> None:
     uploading: dict[str, Any] = {
         "state": cloud_pb2.CLOUD_STATE_CONNECTED,

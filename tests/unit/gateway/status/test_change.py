@@ -112,6 +112,7 @@ def test_copying_that_goes_on_is_no_change_and_another_state_is_one() -> None:
         replace(reported, state=CloudState.OFFLINE),
         replace(reported, uploading=RecordingCopy(RecordingCopyState.VERIFYING)),
         replace(reported, uploads_waiting=1),
+        replace(reported, uploads_left_out=1),
         replace(reported, last_error="gone"),
     ):
         assert change_key(snapshot(cloud=cloud_view(changed, 99.0))) != before

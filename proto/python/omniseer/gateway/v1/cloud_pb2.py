@@ -25,15 +25,15 @@ _sym_db = _symbol_database.Default()
 from omniseer.gateway.v1 import recording_pb2 as omniseer_dot_gateway_dot_v1_dot_recording__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1fomniseer/gateway/v1/cloud.proto\x12\x13omniseer.gateway.v1\x1a#omniseer/gateway/v1/recording.proto\"\xdf\x03\n\x0b\x43loudStatus\x12.\n\x05state\x18\x01 \x01(\x0e\x32\x1f.omniseer.gateway.v1.CloudState\x12\r\n\x05robot\x18\x02 \x01(\t\x12\r\n\x05\x66leet\x18\x03 \x01(\t\x12\x14\n\x0cstate_age_ms\x18\x04 \x01(\x04\x12\x15\n\routbox_events\x18\x05 \x01(\x04\x12\x14\n\x0coutbox_bytes\x18\x06 \x01(\x04\x12\x18\n\x10outbox_max_bytes\x18\x07 \x01(\x04\x12\x16\n\x0e\x65vents_dropped\x18\x08 \x01(\x04\x12\x13\n\x0b\x65vents_sent\x18\t \x01(\x04\x12\x1d\n\x10last_sent_age_ms\x18\n \x01(\x04H\x00\x88\x01\x01\x12\x17\n\x0fuploads_waiting\x18\x0b \x01(\r\x12\x14\n\x0cuploading_id\x18\x0c \x01(\t\x12\x35\n\tuploading\x18\r \x01(\x0b\x32\".omniseer.gateway.v1.RecordingCopy\x12\x16\n\x0euploading_size\x18\x0e \x01(\x04\x12\x1a\n\x12upload_bytes_per_s\x18\x0f \x01(\x04\x12\x16\n\x0euploads_paused\x18\x10 \x01(\t\x12\x12\n\nlast_error\x18\x11 \x01(\tB\x13\n\x11_last_sent_age_ms*\xac\x01\n\nCloudState\x12\x1b\n\x17\x43LOUD_STATE_UNSPECIFIED\x10\x00\x12\x17\n\x13\x43LOUD_STATE_OFFLINE\x10\x01\x12\x19\n\x15\x43LOUD_STATE_CONNECTED\x10\x02\x12\x17\n\x13\x43LOUD_STATE_REFUSED\x10\x03\x12\x17\n\x13\x43LOUD_STATE_FAULTED\x10\x04\x12\x1b\n\x17\x43LOUD_STATE_UNREACHABLE\x10\x05\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1fomniseer/gateway/v1/cloud.proto\x12\x13omniseer.gateway.v1\x1a#omniseer/gateway/v1/recording.proto\"\xf9\x03\n\x0b\x43loudStatus\x12.\n\x05state\x18\x01 \x01(\x0e\x32\x1f.omniseer.gateway.v1.CloudState\x12\r\n\x05robot\x18\x02 \x01(\t\x12\r\n\x05\x66leet\x18\x03 \x01(\t\x12\x14\n\x0cstate_age_ms\x18\x04 \x01(\x04\x12\x15\n\routbox_events\x18\x05 \x01(\x04\x12\x14\n\x0coutbox_bytes\x18\x06 \x01(\x04\x12\x18\n\x10outbox_max_bytes\x18\x07 \x01(\x04\x12\x16\n\x0e\x65vents_dropped\x18\x08 \x01(\x04\x12\x13\n\x0b\x65vents_sent\x18\t \x01(\x04\x12\x1d\n\x10last_sent_age_ms\x18\n \x01(\x04H\x00\x88\x01\x01\x12\x17\n\x0fuploads_waiting\x18\x0b \x01(\r\x12\x14\n\x0cuploading_id\x18\x0c \x01(\t\x12\x35\n\tuploading\x18\r \x01(\x0b\x32\".omniseer.gateway.v1.RecordingCopy\x12\x16\n\x0euploading_size\x18\x0e \x01(\x04\x12\x1a\n\x12upload_bytes_per_s\x18\x0f \x01(\x04\x12\x16\n\x0euploads_paused\x18\x10 \x01(\t\x12\x12\n\nlast_error\x18\x11 \x01(\t\x12\x18\n\x10uploads_left_out\x18\x12 \x01(\rB\x13\n\x11_last_sent_age_ms*\xac\x01\n\nCloudState\x12\x1b\n\x17\x43LOUD_STATE_UNSPECIFIED\x10\x00\x12\x17\n\x13\x43LOUD_STATE_OFFLINE\x10\x01\x12\x19\n\x15\x43LOUD_STATE_CONNECTED\x10\x02\x12\x17\n\x13\x43LOUD_STATE_REFUSED\x10\x03\x12\x17\n\x13\x43LOUD_STATE_FAULTED\x10\x04\x12\x1b\n\x17\x43LOUD_STATE_UNREACHABLE\x10\x05\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'omniseer.gateway.v1.cloud_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
-  _globals['_CLOUDSTATE']._serialized_start=576
-  _globals['_CLOUDSTATE']._serialized_end=748
+  _globals['_CLOUDSTATE']._serialized_start=602
+  _globals['_CLOUDSTATE']._serialized_end=774
   _globals['_CLOUDSTATUS']._serialized_start=94
-  _globals['_CLOUDSTATUS']._serialized_end=573
+  _globals['_CLOUDSTATUS']._serialized_end=599
 # @@protoc_insertion_point(module_scope)

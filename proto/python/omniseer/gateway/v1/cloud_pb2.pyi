@@ -77,6 +77,7 @@ class CloudStatus(_message.Message):
     UPLOAD_BYTES_PER_S_FIELD_NUMBER: _builtins.int
     UPLOADS_PAUSED_FIELD_NUMBER: _builtins.int
     LAST_ERROR_FIELD_NUMBER: _builtins.int
+    UPLOADS_LEFT_OUT_FIELD_NUMBER: _builtins.int
     state: Global___CloudState.ValueType
     """State."""
     robot: _builtins.str
@@ -109,6 +110,10 @@ class CloudStatus(_message.Message):
     """Why no recording is copied although some wait, for people. Empty otherwise."""
     last_error: _builtins.str
     """Why the hub can't be reached or the bridge can't work, and what to do, for people. Empty when all is well."""
+    uploads_left_out: _builtins.int
+    """Recordings that are to be copied and find no place in the full queue. They get one later; until then the robot may
+    delete those that have never had one, when it needs room. As of the bridge's last look at all recordings.
+    """
     @_builtins.property
     def uploading(self) -> _recording_pb2.RecordingCopy:
         """Its copy."""
@@ -133,10 +138,11 @@ class CloudStatus(_message.Message):
         upload_bytes_per_s: _builtins.int = ...,
         uploads_paused: _builtins.str = ...,
         last_error: _builtins.str = ...,
+        uploads_left_out: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_last_sent_age_ms", b"_last_sent_age_ms", "last_sent_age_ms", b"last_sent_age_ms", "uploading", b"uploading"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_last_sent_age_ms", b"_last_sent_age_ms", "events_dropped", b"events_dropped", "events_sent", b"events_sent", "fleet", b"fleet", "last_error", b"last_error", "last_sent_age_ms", b"last_sent_age_ms", "outbox_bytes", b"outbox_bytes", "outbox_events", b"outbox_events", "outbox_max_bytes", b"outbox_max_bytes", "robot", b"robot", "state", b"state", "state_age_ms", b"state_age_ms", "upload_bytes_per_s", b"upload_bytes_per_s", "uploading", b"uploading", "uploading_id", b"uploading_id", "uploading_size", b"uploading_size", "uploads_paused", b"uploads_paused", "uploads_waiting", b"uploads_waiting"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_last_sent_age_ms", b"_last_sent_age_ms", "events_dropped", b"events_dropped", "events_sent", b"events_sent", "fleet", b"fleet", "last_error", b"last_error", "last_sent_age_ms", b"last_sent_age_ms", "outbox_bytes", b"outbox_bytes", "outbox_events", b"outbox_events", "outbox_max_bytes", b"outbox_max_bytes", "robot", b"robot", "state", b"state", "state_age_ms", b"state_age_ms", "upload_bytes_per_s", b"upload_bytes_per_s", "uploading", b"uploading", "uploading_id", b"uploading_id", "uploading_size", b"uploading_size", "uploads_left_out", b"uploads_left_out", "uploads_paused", b"uploads_paused", "uploads_waiting", b"uploads_waiting"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__last_sent_age_ms: _TypeAlias = _typing.Literal["last_sent_age_ms"]  # noqa: Y015
     _WhichOneofArgType__last_sent_age_ms: _TypeAlias = _typing.Literal["_last_sent_age_ms", b"_last_sent_age_ms"]  # noqa: Y015
