@@ -36,7 +36,7 @@ _ELECTED_WITHIN_S: Final = 15.0
 
 
 async def apply(directory: HubDirectory, limits: streams.StreamLimits | None = None) -> list[str]:
-    """Makes the streams and buckets that are missing, and repeats all revocations.
+    """Makes what is missing of streams, buckets and the robots' consumers, and repeats all revocations.
 
     Returns:
         What differs in existing streams.
@@ -51,6 +51,8 @@ async def apply(directory: HubDirectory, limits: streams.StreamLimits | None = N
         differences = await streams.set_up(hub, record.replicas, limits or streams.StreamLimits())
         for user in record.users:
             if user.kind == "robot":
+                if not user.revoked:
+                    await streams.add_command_consumer(hub, user.name)
                 await _list_robot(hub, user)
     return differences
 

@@ -11,6 +11,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from common import config
 from common.addresses import is_loopback
 from common.errors import ExitCode, UserError
 from fleet.connection import FleetAddress
@@ -20,7 +21,8 @@ from hub import administration
 from hub.accounts import refresh_nodes
 from hub.creation import HubPlan, create
 from hub.directory import HubDirectory, Kind
-from hub.receiver.cli import receiver
+from hub.receiver.cli import Config, receiver
+from hub.receiver.config import ReceiverSettings
 from hub.server_config import Node, Places
 from hub.streams import StreamLimits
 
@@ -82,7 +84,10 @@ def apply(
     events_mib: Annotated[int, typer.Option(min=1, help="Space for events, in MiB.")] = 8192,
     events_days: Annotated[int, typer.Option(min=1, max=3650, help="How long events are kept.")] = 30,
 ) -> None:
-    """Create missing streams and buckets, repeat revocations. Ends 1 when existing streams differ."""
+    """Create what streams, buckets and robots' consumers are missing, repeat revocations.
+
+    Ends 1 when existing streams differ.
+    """
     limits = StreamLimits(events_mib * _MIB, events_days)
     hub = HubDirectory(directory)
     differences = _run(administration.apply(hub, limits))
@@ -228,6 +233,21 @@ def receiver_credentials(
     administration.receiver_files(hub, name, out, days=days, again=again)
     _end_old(hub, again=again)
     typer.echo(f"{out}: credentials and signing key of the receiver.")
+
+
+@app.command()
+def relist(config_file: Config = None) -> None:
+    """List again what the store has verified, by the configuration of a receiver: after a lost disk."""
+    from hub.receiver.relisting import relist  # noqa: PLC0415 - boto3
+
+    done = _run(relist(config.load(ReceiverSettings, config_file)))
+    typer.echo(f"Listed {done.listed} recordings.")
+    for each in done.left_out:
+        typer.echo(
+            f"{each} is not listed: no receipt that counts, or files are missing in the store.", err=True
+        )
+    if done.left_out:
+        raise typer.Exit(int(ExitCode.FAILED))
 
 
 @app.command()

@@ -45,9 +45,7 @@ async def serve(settings: ReceiverSettings, stop: asyncio.Event) -> None:
     Raises:
         UserError: A key can't be read, or a socket can't be used.
     """
-    signer = read_signer(settings.signing_key)
-    others = read_public_keys(settings.receipt_keys) if settings.receipt_keys else ()
-    party = Party(settings.fleet, signer, (signer.public_key, *others))
+    party = party_of(settings)
     address = FleetAddress(
         settings.hub.servers, settings.hub.credentials, settings.hub.ca, name=f"receiver of {settings.fleet}"
     )
@@ -83,6 +81,17 @@ async def serve(settings: ReceiverSettings, stop: asyncio.Event) -> None:
         finally:
             await server.stop(rpc.STOP_GRACE_S)
             settings.socket.unlink(missing_ok=True)
+
+
+def party_of(settings: ReceiverSettings) -> Party:
+    """Returns as whom a receiver confirms.
+
+    Raises:
+        UserError: A key can't be read.
+    """
+    signer = read_signer(settings.signing_key)
+    others = read_public_keys(settings.receipt_keys) if settings.receipt_keys else ()
+    return Party(settings.fleet, signer, (signer.public_key, *others))
 
 
 @asynccontextmanager

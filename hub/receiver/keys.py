@@ -15,6 +15,8 @@ from typing import Final
 
 from fleet.names import RECORDING_ID
 
+RECORDING: Final = ".recording"
+"""What the key of a recording with its receipt ends with."""
 _FORBIDDEN: Final = frozenset('\\:*?"<>|')
 """What file systems, drives and streams give a meaning to: recordings are copied to many."""
 _MOST_BYTES: Final = 255
@@ -49,7 +51,7 @@ class RecordingKeys:
     @property
     def recording(self) -> str:
         """Of the recording with its receipt."""
-        return f"{self.folder}.recording"
+        return f"{self.folder}{RECORDING}"
 
     def file(self, name: str) -> str:
         """Returns the key of a file."""

@@ -171,19 +171,26 @@ class ReceiverService:
         await send(pb.UploadResponse(error=pb.UploadError(code=refusal.code, message=str(refusal))))
         return code.lower()
 
+    async def list_again(self, robot: str, recording_id: str) -> bool:
+        """Lists a recording of the store in the hub's bucket; returns whether it is verified.
+
+        Raises:
+            BadNameError: No recording has such an ID.
+            StoreError: The store does not answer.
+            Refusal: The hub has no place for it.
+            HubError: The hub does not answer.
+        """
+        stored = await self._verified(robot, self._keys(robot, recording_id))
+        if stored:
+            await self._list(robot, stored)
+        return stored is not None
+
     async def _begin_upload(self, robot: str, request: pb.BeginUploadRequest, _send: _Send) -> Message:
         recording = request.recording
-        keys = self._keys(robot, recording.id)
-        if content := await self._call(self._store.read, keys.recording, _RECORD_BYTES):
-            stored = _parsed(pb.StoredRecording, content)
-            if (
-                stored
-                and self._counts(stored.receipt, self._receipt_of(robot, recording))
-                and not await self._missing(keys, stored.files)
-            ):
-                # The bucket may have lost it.
-                await self._list(robot, stored)
-                return pb.BeginUploadResponse(receipt=stored.receipt)
+        if stored := await self._verified(robot, self._keys(robot, recording.id), recording):
+            # The bucket may have lost it.
+            await self._list(robot, stored)
+            return pb.BeginUploadResponse(receipt=stored.receipt)
         return pb.BeginUploadResponse()
 
     async def _begin_file(self, robot: str, request: pb.BeginFileRequest, _send: _Send) -> Message:
@@ -382,6 +389,24 @@ class ReceiverService:
         """Returns the name of a file that is not in the store with its size; empty if all are."""
         sizes = await self._call(self._store.sizes, f"{keys.folder}/", 2 * MOST_FILES)
         return next((file.name for file in files if sizes.get(keys.file(file.name)) != file.size), "")
+
+    async def _verified(
+        self, robot: str, keys: RecordingKeys, recording: Recording | None = None
+    ) -> pb.StoredRecording | None:
+        """Returns a recording as the store has it, with a receipt that counts; None if it is not verified.
+
+        Args:
+            robot: Whose it is.
+            keys: Where it is.
+            recording: The content that it is to have; None: any.
+        """
+        content = await self._call(self._store.read, keys.recording, _RECORD_BYTES)
+        stored = _parsed(pb.StoredRecording, content) if content else None
+        if stored is None or stored.recording.id != keys.recording_id:
+            return None
+        if not self._counts(stored.receipt, self._receipt_of(robot, recording or stored.recording)):
+            return None
+        return None if await self._missing(keys, stored.files) else stored
 
     async def _receipt(self, robot: str, keys: RecordingKeys, file: RecordingFile) -> pb.SignedReceipt | None:
         """Returns the receipt of a file that is in the store, if there is one.

@@ -18,6 +18,7 @@ from botocore.parsers import ResponseParserError
 
 from common.errors import UserError
 from hub.receiver.config import StoreSettings
+from hub.receiver.keys import RECORDING
 
 if TYPE_CHECKING:
     from types_boto3_s3 import S3Client
@@ -166,6 +167,20 @@ class Store:
             pages = self._client.get_paginator("list_objects_v2").paginate(Bucket=self._bucket, Prefix=prefix)
             found = (each for page in pages for each in page.get("Contents", []))
             return {each["Key"]: each["Size"] for each in islice(found, most)}
+
+    def recordings(self, prefix: str) -> Iterator[tuple[str, str]]:
+        """Yields the robot and the ID of each recording of a fleet, "lab/", that was completed."""
+        with _problems():
+            paginator = self._client.get_paginator("list_objects_v2")
+            # Level by level: the files of the recordings, millions perhaps, are not listed.
+            for robots in paginator.paginate(Bucket=self._bucket, Prefix=prefix, Delimiter="/"):
+                for robot in robots.get("CommonPrefixes", []):
+                    place = robot["Prefix"]
+                    for page in paginator.paginate(Bucket=self._bucket, Prefix=place, Delimiter="/"):
+                        for each in page.get("Contents", []):
+                            name = each["Key"].removeprefix(place)
+                            if name.endswith(RECORDING):
+                                yield place.removeprefix(prefix).rstrip("/"), name.removesuffix(RECORDING)
 
     def open_upload(self, key: str) -> str:
         """Returns the ID of the upload of a key: the oldest that is not completed, or a new one."""
