@@ -211,7 +211,7 @@ def operator_files(directory: HubDirectory, name: str, out: Path, *, days: float
 
 
 def receiver_files(directory: HubDirectory, name: str, out: Path, *, days: float | None, again: bool) -> None:
-    """Issues credentials for receivers: receiver.creds, ca.pem, receipts.key, fleet.yaml.
+    """Issues credentials for receivers: receiver.creds, ca.pem, receipts.key, receipts.pub, fleet.yaml.
 
     Raises:
         UserError: there is one of this name.
@@ -224,6 +224,7 @@ def receiver_files(directory: HubDirectory, name: str, out: Path, *, days: float
                 out / "receiver.creds": creds.text().encode(),
                 out / "ca.pem": directory.secret("keys/ca.pem"),
                 out / "receipts.key": directory.secret("receipts.key"),
+                out / "receipts.pub": directory.secret("receipts.pub"),
                 out / "fleet.yaml": _fragment(record),
             }
         )

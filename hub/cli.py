@@ -17,7 +17,7 @@ from common.errors import ExitCode, UserError
 from fleet.connection import FleetAddress
 from fleet.errors import HubError, HubReason
 from fleet.servers import exposed_server
-from hub import administration
+from hub import administration, receipts
 from hub.accounts import refresh_nodes
 from hub.creation import HubPlan, create
 from hub.directory import HubDirectory, Kind
@@ -233,6 +233,33 @@ def receiver_credentials(
     administration.receiver_files(hub, name, out, days=days, again=again)
     _end_old(hub, again=again)
     typer.echo(f"{out}: credentials and signing key of the receiver.")
+
+
+receipts_app = typer.Typer(help="The key that receivers sign receipts with.", no_args_is_help=True)
+app.add_typer(receipts_app, name="receipts")
+
+
+@receipts_app.command("rotate")
+def rotate_receipts(directory: Dir = _DEFAULT_DIR) -> None:
+    """Make a new key that receivers are to sign with; the old ones still count. Needs no server."""
+    count = receipts.rotate(HubDirectory(directory))
+    typer.echo(
+        f"{directory}: a new key of receipts; {count} count now. In this order:\n"
+        f"1. {directory}/receipts.pub to each robot (hub.receipts) and each receiver (receipt_keys), and\n"
+        "   restart them; for each person a new login: robot-bridge hub operator NAME --again\n"
+        f"2. {directory}/receipts.key to each receiver (signing_key), and restart it\n"
+        f"3. if the old key was stolen: robot-bridge hub receipts retire --dir {directory}"
+    )
+
+
+@receipts_app.command("retire")
+def retire_receipts(directory: Dir = _DEFAULT_DIR) -> None:
+    """Let the newest key alone count from now on, after it has come everywhere. Needs no server."""
+    count = receipts.retire(HubDirectory(directory))
+    typer.echo(
+        f"{directory}/receipts.pub: {count} old keys were removed. Copy it to each robot and receiver,\n"
+        "restart them, and make new logins (--again). What old keys have signed is not confirmed any more."
+    )
 
 
 @app.command()

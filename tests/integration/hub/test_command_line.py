@@ -155,6 +155,7 @@ def test_logins_of_people_and_receivers(hub: Path, tmp_path: Path) -> None:
         "receiver.creds",
         "ca.pem",
         "receipts.key",
+        "receipts.pub",
         "fleet.yaml",
     }
     assert len(json.loads(_type("robots", "--all", "--json", "--dir", str(hub)).output)) == 2
