@@ -11,7 +11,7 @@ LONGEST_S: Final = 60.0
 
 
 class JitteredBackoff:
-    """Pauses of 1 s to 60 s, each between half and all of what the backoff says, so that no fleet is in step.
+    """Pauses that grow from 1 s, each between half and all of the backoff's, so that no fleet is in step.
 
     Args:
         longest_s: upper limit of a pause, in seconds.
@@ -25,9 +25,13 @@ class JitteredBackoff:
         """Failures since the last success."""
         return self._backoff.failures
 
+    def next_s(self) -> float:
+        """Counts a failure and returns the pause before the next attempt, in seconds."""
+        return self._backoff.next_s() * random.uniform(0.5, 1.0)  # noqa: S311  # no secret
+
     async def wait(self) -> None:
         """Counts a failure and waits."""
-        await asyncio.sleep(self._backoff.next_s() * random.uniform(0.5, 1.0))  # noqa: S311  # no secret
+        await asyncio.sleep(self.next_s())
 
     def reset(self) -> None:
         """Begins again with the shortest pause, after a success."""

@@ -15,7 +15,7 @@ What runs for long (`follow`, `pull`, `serve`) outlives the sessions.
 
 import asyncio
 import random
-from collections.abc import AsyncGenerator
+from collections.abc import AsyncGenerator, Collection
 from contextlib import aclosing, asynccontextmanager
 from dataclasses import dataclass
 from enum import Enum
@@ -301,6 +301,7 @@ class Hub:
         of_one: int | None = None,
         busy: bytes = b"",
         of_people: bool = False,
+        long: Collection[str] = (),
     ) -> None:
         """Answers requests, on subjects "fleet.<robot>.<kind>.<name>", over all lost connections.
 
@@ -316,8 +317,12 @@ class Hub:
             of_one: of these, about one robot; None: all of them.
             busy: answer to requests beyond that.
             of_people: whether they are those of people, who share an account with this program.
+            long: names of requests that take minutes: `at_once` and `of_one` hold for them and for the others
+                each, so that the others are answered meanwhile.
         """
-        service = Service(subject, queue, handler, at_once, of_one or at_once, busy, of_people)
+        service = Service(
+            subject, queue, handler, at_once, of_one or at_once, busy, of_people, frozenset(long)
+        )
         self._services.append(service)
         if self._session is not None:
             await serve_in(self._session, service, self._calls)

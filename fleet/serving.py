@@ -52,6 +52,7 @@ class Service:
     of_one: int
     busy: bytes
     of_people: bool
+    long: frozenset[str]
 
 
 async def serve_in(session: Session, service: Service, calls: set[asyncio.Task[None]]) -> None:
@@ -65,20 +66,21 @@ async def serve_in(session: Session, service: Service, calls: set[asyncio.Task[N
     Raises:
         HubError: the session is lost.
     """
-    running: dict[asyncio.Task[None], str] = {}
-    """With the robot."""
+    running: dict[asyncio.Task[None], tuple[str, bool]] = {}
+    """With the robot, and whether it is one of those that take long."""
 
     async def on_message(message: Message) -> None:
         parts = message.subject.split(".")
         if len(parts) < 3 or not message.reply.startswith(_inboxes(service, parts[1])):
             return
         request = Request(parts[1], parts[-1], message.payload, session, message.reply)
-        of_robot = sum(robot == request.robot for robot in running.values())
-        if len(running) >= service.at_once or of_robot >= service.of_one:
+        is_long = request.name in service.long
+        alike = [robot for robot, long in running.values() if long is is_long]
+        if len(alike) >= service.at_once or alike.count(request.robot) >= service.of_one:
             await request.respond(service.busy)
             return
         task = asyncio.ensure_future(service.handler(request))
-        running[task] = request.robot
+        running[task] = request.robot, is_long
         calls.add(task)
         task.add_done_callback(running.pop)
         task.add_done_callback(calls.discard)

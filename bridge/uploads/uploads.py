@@ -5,7 +5,8 @@
 | a gate closes | the attempt ends within a second: PAUSED; later it goes on at the first missing part |
 | a more urgent recording is queued | it takes the place of the one that is uploaded |
 | an attempt fails because of this recording | FAILED; again after 1, 2, 4 ... 300 s; others go on |
-| gateway, hub or store fail | FAILED; all wait 1, 2, 4 ... 300 s, and from 1 s again after progress |
+| gateway, hub or store fail | FAILED; all wait 1, 2, 4 ... 300 s with jitter, from 1 s again after progress |
+| the hours begin | it begins within 30 s: other robots' hours begin with them |
 | they fail three times at one recording, without progress | as a failure of that one: others go on |
 | the recording is deleted on the robot | it leaves the queue |
 | the queue is full | a more urgent recording takes the last one's place, which competes for one again |
@@ -15,12 +16,14 @@
 
 import asyncio
 import logging
+import random
 from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Final
 
+from bridge.jittered_backoff import JitteredBackoff
 from bridge.uploads import gates
 from bridge.uploads.attempt import Attempt, Parties, RecordingSource, ended
 from bridge.uploads.config import UploadSettings
@@ -59,6 +62,8 @@ _log = logging.getLogger(__name__)
 
 _TICK_S: Final = 1.0
 """How often the gates are looked at."""
+OPENING_SPREAD_S: Final = 30.0
+"""After the gates have opened where hours are set: those of a whole fleet may begin in the same second."""
 _RATE_TICKS: Final = 5
 """Over how many the rate is measured."""
 
@@ -117,7 +122,8 @@ class Uploads:
         self._charging, self._changed = charging, changed
         self._uploads: dict[str, Upload] = {}
         self._wake = asyncio.Event()
-        self._path = Backoff(FIRST_PAUSE_S, LONGEST_PAUSE_S)
+        # A receiver that fails, or is busy, is so for a whole fleet at once.
+        self._path = JitteredBackoff(LONGEST_PAUSE_S)
         self._path_due_s = 0.0
         self._load_pause = Backoff(FIRST_PAUSE_S, LONGEST_PAUSE_S)
         self._load_due_s = 0.0
@@ -329,6 +335,9 @@ class Uploads:
             await self._finish(*self._running)
         closed = await self._closed() if self.waiting else ""
         if closed != self.paused:
+            if not closed and self._settings.hours:
+                opens_s = self._now_s + random.uniform(0.0, OPENING_SPREAD_S)  # noqa: S311  # no secret
+                self._path_due_s = max(self._path_due_s, opens_s)
             self.paused = closed
             self._changed()
         if not closed:

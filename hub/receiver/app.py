@@ -29,9 +29,11 @@ _log = logging.getLogger(__name__)
 SERVICE: Final = "receiver"
 """Of the health service: whether the receiver is connected to the hub."""
 AT_ONCE: Final = 8
-"""Requests in hand; further ones get BUSY."""
+"""Requests in hand of those that read files again, of the others, and of people; further ones get BUSY."""
 OF_ONE: Final = 4
 """Of these, of one robot, which uploads one file at a time: the others are served whatever it does."""
+_LONG: Final = frozenset({"verify_file", "complete_upload"})
+"""Requests for which a receiver reads for minutes; other robots begin and send files meanwhile."""
 _SWEEP_EVERY_S: Final = 3600.0
 _MOST_SWEPT: Final = 1000
 _MOST_LOOKED_AT: Final = 100_000
@@ -71,6 +73,7 @@ async def serve(settings: ReceiverSettings, stop: asyncio.Event) -> None:
                         of_one=OF_ONE,
                         busy=busy(),
                         of_people=of_people,
+                        long=_LONG,
                     )
                 _log.info("receiving recordings of the fleet %s", settings.fleet)
                 await first_to_end(

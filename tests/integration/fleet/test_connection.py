@@ -242,6 +242,32 @@ async def test_one_robot_has_a_share_of_the_requests_in_hand(servers: NatsServer
         assert sorted(await asyncio.gather(*pending)) == [b"busy"] * 4 + [b"done"] * 2
 
 
+async def test_requests_that_take_long_keep_no_others_out(servers: NatsServers) -> None:
+    proceed = asyncio.Event()
+
+    async def answer(request: Request) -> None:
+        if request.name == "verify_file":
+            await proceed.wait()
+        await request.respond(b"done")
+
+    async with (
+        connect(FleetAddress(servers.urls)) as receiver,
+        connect(FleetAddress(servers.urls, inbox=names.inbox_prefix("r1"))) as robot,
+    ):
+        await receiver.connected(10)
+        await robot.connected(10)
+        await receiver.serve(
+            names.UPLOAD_SUBJECTS, names.RECEIVERS, answer, at_once=2, busy=b"busy", long={"verify_file"}
+        )
+        verify, begin = names.upload_subject("r1", "verify_file"), names.upload_subject("r1", "begin_file")
+        pending = {asyncio.create_task(robot.request(verify, b"", 20)) for _ in range(3)}
+        done, pending = await asyncio.wait(pending, return_when=asyncio.FIRST_COMPLETED)
+        assert [each.result() for each in done] == [b"busy"]
+        assert await robot.request(begin, b"", 20) == b"done"
+        proceed.set()
+        assert await asyncio.gather(*pending) == [b"done", b"done"]
+
+
 async def test_a_consumer_that_the_server_has_not_heard_of_yet_is_waited_for(
     servers: NatsServers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
