@@ -312,7 +312,8 @@ def _reported_target(row: FleetRow) -> str:
     if row.state is None or not row.state.gateway_target:
         raise UserError(
             f"{row.robot} does not report where its gateway is",
-            f"Set 'advertise' in the robot's bridge.yaml, or type: robotctl robots add {row.robot} HOST:PORT",
+            "Set 'advertised_target' in the robot's bridge.yaml, or type: "
+            f"robotctl robots add {row.robot} HOST:PORT",
         )
     try:
         return parse_target(row.state.gateway_target)

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import re
 import select
 import subprocess
 import threading
@@ -14,6 +15,7 @@ from unittest import mock
 import pytest
 from nacl.signing import SigningKey
 
+from bridge.config import BridgeSettings
 from console.fleet.hub import EventQuery, read_events, read_recordings
 from console.fleet.values import FleetItem, RobotEvent
 from console.fleet.values import StoredRecording as Stored
@@ -368,6 +370,15 @@ def test_what_can_not_be_done_says_what_to_do(
     done = robotctl("fleet", *words, "--hub", shared_hub.urls)
     assert done.returncode == code
     assert said in only_line(done.stderr)
+
+
+def test_the_setting_that_gives_a_robot_an_address_is_one_of_the_bridge(shared_hub: FleetHub) -> None:
+    """The defect: the bridge has no setting of the name that was given, and does not start with one."""
+    done = robotctl("fleet", "monitor", "lab1", "--hub", shared_hub.urls)
+    named = re.search(r"Set '(\w+)' in the robot's bridge\.yaml", only_line(done.stderr))
+    assert named
+    settings = BridgeSettings.model_validate({named[1]: "10.0.0.7:50051"})
+    assert settings.advertised_target == "10.0.0.7:50051"
 
 
 @pytest.fixture(scope="module")
