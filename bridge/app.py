@@ -22,6 +22,7 @@ from bridge.sender import Sender
 from bridge.state_sender import StateSender
 from bridge.uploading import NoUploads, QueuedUploads, Uploading, apply_rule
 from common import bind, heartbeat, rpc
+from common.broadcast import Broadcast
 from common.health import Health
 from common.tasks import first_to_end
 from fleet.connection import FleetAddress, Hub, connect
@@ -50,7 +51,8 @@ async def serve(settings: BridgeSettings, stop: asyncio.Event) -> None:
         aclosing(GatewayCalls(settings.gateway, run_id)) as gateway,
     ):
         robot_status = StatusReader(settings.gateway)
-        queue = _queue(settings, kept, hub, gateway, robot_status)
+        changes = Broadcast()
+        queue = _queue(settings, kept, hub, gateway, status=robot_status, changes=changes)
         uploads: Uploading = QueuedUploads(queue) if queue else NoUploads()
         sender = Sender(robot, kept, hub)
         status = Status(
@@ -60,9 +62,10 @@ async def serve(settings: BridgeSettings, stop: asyncio.Event) -> None:
             hub=hub,
             sender=sender,
             uploads=uploads,
+            changes=changes,
             gateway=lambda: robot_status.error,
         )
-        requests = PendingRequests(robot, kept, status.changes.notify_all)
+        requests = PendingRequests(robot, kept, changes.notify_all)
         states = StateSender(
             robot,
             settings.advertised_target,
@@ -98,7 +101,13 @@ async def serve(settings: BridgeSettings, stop: asyncio.Event) -> None:
 
 
 def _queue(
-    settings: BridgeSettings, kept: Outbox, hub: Hub, gateway: GatewayCalls, status: StatusReader
+    settings: BridgeSettings,
+    kept: Outbox,
+    hub: Hub,
+    gateway: GatewayCalls,
+    *,
+    status: StatusReader,
+    changes: Broadcast,
 ) -> "Uploads | None":
     """Returns the uploads; None for a robot that has no receivers' keys."""
     if settings.hub.receipts is None:
@@ -117,7 +126,7 @@ def _queue(
         source=gateway,
         hub=hub,
         charging=lambda: is_charging(status.current),
-        changed=status.changes.notify_all,
+        changed=changes.notify_all,
     )
 
 

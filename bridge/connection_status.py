@@ -33,6 +33,7 @@ class Status:
         robot: its name in the fleet.
         fleet: the name of the fleet.
         outbox, hub, sender, uploads: what it is made of.
+        changes: notified after each change that a report is worth.
         gateway: returns why the gateway's status does not come; empty while it does.
         clock: monotonic seconds.
     """
@@ -46,16 +47,16 @@ class Status:
         hub: Hub,
         sender: Sender,
         uploads: Uploading,
+        changes: Broadcast,
         gateway: Callable[[], str],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._robot, self._fleet = robot, fleet
         self._outbox, self._hub, self._sender, self._uploads = outbox, hub, sender, uploads
         self._gateway = gateway
+        self.changes = changes
         self._clock = clock
         self._phase = Phase(State.OFFLINE, clock())
-        self.changes = Broadcast()
-        """Notified after each change that a report is worth."""
 
     def message(self) -> pb.CloudStatus:
         """Returns the status now."""

@@ -20,9 +20,11 @@ class Broadcast:
 
     def __init__(self) -> None:
         self._event = asyncio.Event()
+        self._notified = 0
 
     def notify_all(self) -> None:
         """Wakes every task in `wait_until`, to check its condition again."""
+        self._notified += 1
         self._event.set()
         # The tasks that wait hold the old event; later ones must not be woken by it.
         self._event = asyncio.Event()
@@ -44,17 +46,12 @@ class Broadcast:
     async def now_and_on_change(self, heartbeat_s: Callable[[], float] = _idle) -> AsyncGenerator[None]:
         """Yields now, on each notification, and at least every so many seconds, without end.
 
+        Notifications while a turn is used make one turn, the next one.
+
         Args:
             heartbeat_s: evaluated before each wait.
         """
-        changed = True
-
-        def has_changed() -> bool:
-            nonlocal changed
-            before, changed = changed, True
-            return before
-
         while True:
-            changed = False
+            seen = self._notified
             yield
-            await self.wait_until(has_changed, heartbeat_s())
+            await self.wait_until(lambda seen=seen: self._notified != seen, heartbeat_s())  # type: ignore[misc]

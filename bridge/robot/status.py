@@ -6,7 +6,6 @@ from typing import Any, Final
 from bridge.config import GatewaySettings
 from bridge.jittered_backoff import JitteredBackoff
 from bridge.robot.gateway import STATUS_SILENT_S, explained, statuses
-from common.broadcast import Broadcast
 from common.errors import UserError
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus
 
@@ -25,7 +24,6 @@ class StatusReader:
         newest: the last one that was received; None before the first.
         reachable: whether it still comes.
         error: why not, for people; empty before the first attempt has ended.
-        changes: notified after each status, and of `reachable`.
     """
 
     def __init__(self, settings: GatewaySettings) -> None:
@@ -33,7 +31,6 @@ class StatusReader:
         self.newest: SystemStatus | None = None
         self.reachable = False
         self.error = ""
-        self.changes = Broadcast()
 
     @property
     def current(self) -> SystemStatus | None:
@@ -54,10 +51,8 @@ class StatusReader:
                 if self.reachable or not backoff.failures or line != self.error:
                     _log.warning("no status from the gateway: %s", line)
                 self.reachable, self.error = False, line
-                self.changes.notify_all()
             await backoff.wait()
 
     def _take(self, response: Any) -> None:
         self.newest = response.status
         self.reachable, self.error = True, ""
-        self.changes.notify_all()

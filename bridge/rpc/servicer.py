@@ -1,5 +1,6 @@
 """BridgeService: receives, maps, calls, maps, replies."""
 
+import asyncio
 from collections.abc import AsyncIterator
 from typing import Any, Final
 
@@ -20,6 +21,8 @@ from omniseer.fleet.v1 import command_pb2
 SERVICE: Final = pb.DESCRIPTOR.services_by_name["BridgeService"].full_name
 
 _MS_PER_S: Final = 1000
+_LEAST_INTERVAL_S: Final = 0.1
+"""Between two states: each takes some ms where the queue is long."""
 OUTCOMES: Final = {
     pb.REQUEST_OUTCOME_DONE: command_pb2.COMMAND_OUTCOME_DONE,
     pb.REQUEST_OUTCOME_REFUSED: command_pb2.COMMAND_OUTCOME_REFUSED,
@@ -59,9 +62,11 @@ class BridgeServicer(pb_grpc.BridgeServiceServicer):
     async def WatchState(  # noqa: N802  # the schema names it
         self, _request: pb.WatchStateRequest, _context: grpc.aio.ServicerContext[Any, Any]
     ) -> AsyncIterator[pb.WatchStateResponse]:
-        """Streams the state, now, on every change and every second; a slow reader skips outdated ones."""
+        """Streams the state, now, after changes and every second; a slow reader skips outdated ones."""
         async for _ in self._status.changes.now_and_on_change():
             yield self._state()
+            # A queue of a thousand uploads that is made, or that a gate closes, changes as often.
+            await asyncio.sleep(_LEAST_INTERVAL_S)
 
     async def UploadRecording(  # noqa: N802  # the schema names it
         self, request: pb.UploadRecordingRequest, _context: grpc.aio.ServicerContext[Any, Any]

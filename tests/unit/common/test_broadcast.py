@@ -26,3 +26,14 @@ async def test_the_heartbeat_is_asked_for_before_each_wait() -> None:
         await asyncio.wait_for(anext(turns), 5)
         with pytest.raises(TimeoutError):
             await asyncio.wait_for(anext(turns), 0.05)
+
+
+async def test_a_change_while_a_turn_is_used_is_the_next_turn() -> None:
+    """The defect: it waited for the next notification, or the heartbeat."""
+    changes = Broadcast()
+    async with aclosing(changes.now_and_on_change(lambda: 60.0)) as turns:
+        await anext(turns)
+        changes.notify_all()
+        await asyncio.wait_for(anext(turns), 5)
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(anext(turns), 0.05)
