@@ -12,7 +12,7 @@ from bridge.commands.pending_requests import PendingRequests
 from bridge.config import BridgeSettings
 from bridge.connection_status import Status
 from bridge.outbox.outbox import Outbox, outbox
-from bridge.outbox.uploads import StoredUploads
+from bridge.outbox.uploads import StoredUploads, most_kept
 from bridge.robot.calls import GatewayCalls
 from bridge.robot.events import EventReader
 from bridge.robot.status import StatusReader
@@ -127,6 +127,7 @@ def _queue(
         hub=hub,
         charging=lambda: is_charging(status.current),
         changed=changes.notify_all,
+        most_kept=most_kept(kept.max_bytes),
     )
 
 

@@ -69,7 +69,7 @@ class OutboxSettings(Section):
     """What waits for the hub."""
 
     max_bytes: int = Field(default=64 * MIB, ge=8 * MIB, le=4096 * MIB)
-    """Of the outbox on the disk, all its files together."""
+    """Of the outbox on the disk, all its files together, but for a damaged one that was moved aside."""
 
 
 class CommandSettings(Section):

@@ -3,13 +3,25 @@
 import json
 import logging
 from dataclasses import asdict
-from typing import Any
+from typing import Any, Final
 
+from bridge.outbox.database import RESERVE_BYTES
 from bridge.outbox.outbox import Outbox
-from bridge.uploads.queue import Priority, State, Upload
+from bridge.uploads.queue import MOST_KEPT, Priority, State, Upload
 from bridge.values import OutboxError
 
 _log = logging.getLogger(__name__)
+
+_ROW_BYTES: Final = 1024
+"""Of a row on the disk: 400 with a short label, up to 1200 with the longest one."""
+
+
+def most_kept(max_bytes: int) -> int:
+    """Returns how many uploads that wait no more an outbox of so many bytes remembers.
+
+    They take about a quarter of its room, so that events have theirs.
+    """
+    return min(MOST_KEPT, (max_bytes - RESERVE_BYTES) // 4 // _ROW_BYTES)
 
 
 class StoredUploads:

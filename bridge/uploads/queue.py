@@ -18,7 +18,8 @@ from typing import Final, Protocol
 MOST_WAITING: Final = 1000
 """Recordings in the queue; a further one is refused, or takes the place of a less urgent one."""
 MOST_KEPT: Final = 10_000
-"""Recordings of which it is remembered that they are verified; the oldest are forgotten first."""
+"""Recordings of which it is remembered that they are verified or were cancelled; the oldest verified ones are
+forgotten first."""
 FIRST_PAUSE_S: Final = 1.0
 LONGEST_PAUSE_S: Final = 300.0
 MOST_CUTS: Final = 3

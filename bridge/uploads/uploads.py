@@ -104,6 +104,7 @@ class Uploads:
         hub: The connection to the hub.
         charging: Returns whether the main battery is being charged; None if unknown.
         changed: Called after each change that is worth a report.
+        most_kept: Uploads that wait no more and are remembered; the store may have room for fewer.
     """
 
     def __init__(
@@ -116,10 +117,11 @@ class Uploads:
         hub: Requests,
         charging: Callable[[], bool | None],
         changed: Callable[[], None],
+        most_kept: int = MOST_KEPT,
     ) -> None:
         self._settings, self._fleet = settings, fleet
         self._store, self._source, self._hub = store, source, hub
-        self._charging, self._changed = charging, changed
+        self._charging, self._changed, self._most_kept = charging, changed, most_kept
         self._uploads: dict[str, Upload] = {}
         self._wake = asyncio.Event()
         # A receiver that fails, or is busy, is so for a whole fleet at once.
@@ -498,8 +500,10 @@ class Uploads:
         self._put(upload)
         try:
             await self._write(upload.recording_id)
-            if len(self._uploads) > MOST_WAITING + MOST_KEPT and (oldest := self._oldest_settled()):
-                await self._forget(oldest)
+            # Two for one: fewer than before may be remembered, where the outbox was made smaller.
+            for _ in range(min(2, self._beyond_kept)):
+                if oldest := self._oldest_settled():
+                    await self._forget(oldest)
         except OSError as error:
             self._note_disk(error)
 
@@ -543,8 +547,17 @@ class Uploads:
         _log.error("%s", self.disk_error)
         self._changed()
 
+    @property
+    def _beyond_kept(self) -> int:
+        """How many more settled ones there are than are remembered; not positive if there are none."""
+        return sum(each.state not in WAITING for each in self._uploads.values()) - self._most_kept
+
     def _oldest_settled(self) -> str | None:
-        return next((key for key, each in self._uploads.items() if each.state not in WAITING), None)
+        """Returns the one to forget first: a rule queues no verified one again, which the recorder knows."""
+        for state in (State.VERIFIED, State.LOCAL):
+            if found := next((key for key, each in self._uploads.items() if each.state is state), None):
+                return found
+        return None
 
     def _has_room_for(self, upload: Upload) -> bool:
         known = self._uploads.get(upload.recording_id)

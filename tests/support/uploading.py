@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from bridge.uploads.attempt import RecordingSource
 from bridge.uploads.config import UploadSettings
-from bridge.uploads.queue import Upload
+from bridge.uploads.queue import MOST_KEPT, Upload
 from bridge.uploads.receivers import Requests
 from bridge.uploads.uploads import Fleet, Uploads
 from common.healthcheck import state_of
@@ -194,6 +194,7 @@ async def running_uploads(
     rows: Rows | None = None,
     *,
     charging: Callable[[], bool | None] = lambda: None,
+    most_kept: int = MOST_KEPT,
     **settings: Any,
 ) -> AsyncIterator[Running]:
     """Uploads as a bridge runs them; ended in order when the block ends."""
@@ -211,6 +212,7 @@ async def running_uploads(
             hub=hub,
             charging=charging,
             changed=changed,
+            most_kept=most_kept,
         ),
         rows,
     )

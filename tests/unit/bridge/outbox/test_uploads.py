@@ -1,14 +1,19 @@
 """The queue of uploads over a restart."""
 
+import hashlib
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from pydantic import ValidationError
 
+from bridge.config import OutboxSettings
+from bridge.outbox.database import Database
 from bridge.outbox.outbox import Outbox, outbox
-from bridge.outbox.uploads import StoredUploads
+from bridge.outbox.uploads import StoredUploads, _row, most_kept
 from bridge.uploading import STATES
-from bridge.uploads.queue import Priority, State, Upload
+from bridge.uploads.queue import MOST_KEPT, MOST_WAITING, Priority, State, Upload
+from bridge.values import Event, Position
 from omniseer.gateway.v1.recording_pb2 import RecordingCopyState
 
 UPLOAD = Upload(
@@ -51,6 +56,30 @@ async def test_a_disk_that_fails_is_an_error_of_the_disk(tmp_path: Path) -> None
     assert kept.error
     assert kept.refusals == 1
     await kept.close()
+
+
+def test_the_smallest_outbox_has_room_for_events_beside_the_queue(tmp_path: Path) -> None:
+    """The defect: a full queue took more than all of it, and every event was dropped."""
+    smallest = 8 << 20
+    with pytest.raises(ValidationError):
+        OutboxSettings(max_bytes=smallest - 1)
+    database = Database(tmp_path, smallest)
+    longest = replace(UPLOAD, label="\u00fc" * 100, sha256=b"s" * 32)
+    with database._use() as db:
+        for number in range(MOST_WAITING + most_kept(smallest)):
+            name = hashlib.sha256(str(number).encode()).hexdigest()[:23]
+            row = _row(replace(longest, recording_id=name))
+            db.execute("INSERT INTO uploads VALUES (?, ?)", (name, row))
+    for first in range(1, 1001, 100):
+        events = [Event("run", number, 1, b"x" * 1000) for number in range(first, first + 100)]
+        database.append(events, Position("run", first + 99))
+    assert database.facts.events == 1000
+    assert database.facts.dropped == 0
+    database.close()
+
+
+def test_an_outbox_of_the_default_size_remembers_as_many_as_there_may_be() -> None:
+    assert most_kept(OutboxSettings().max_bytes) == MOST_KEPT
 
 
 def test_every_state_has_its_word_in_the_schema() -> None:
