@@ -48,6 +48,8 @@ class Sample:
     """Its number among those of its publisher; 0 if the middleware does not number messages."""
     monotonic_ns: int
     """When it was received, by CLOCK_MONOTONIC."""
+    publishers: int = 0
+    """Of a latched channel: how many publishers its topic had when this message was there; 0 if unknown."""
 
 
 class GapCause(Enum):

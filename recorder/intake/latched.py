@@ -1,8 +1,12 @@
 """The newest messages of transient local topics, which each segment begins with. Pure.
 
-Messages carry no publisher. The one that a message replaces is found by its number: the one before it, or the
-only one there is. An assumption: a publisher keeps one message for late subscribers (depth 1), as those of
-/tf_static, /robot_description and maps do; Fast DDS does not announce the depth.
+Messages carry no publisher, so that one publisher's message must not be taken for another's: what it replaced
+would be missing from every segment that begins later. While the topic has more publishers than messages are
+kept, a message may be the first of its publisher and replaces none but its own repetition. Otherwise it
+replaces the one that its number follows, or, of a single publisher, the only one there is. An assumption: a
+publisher keeps one message for late subscribers (depth 1), as those of /tf_static, /robot_description and
+maps do; Fast DDS does not announce the depth. Where the middleware numbers no messages, those of several
+publishers stay until there are MAX_MESSAGES.
 """
 
 from collections.abc import Sequence
@@ -56,14 +60,16 @@ class LatchedCache:
 
 
 def _replaced_by(sample: Sample, kept: Sequence[Sample]) -> int | None:
-    """Returns the index of the message that this one makes obsolete; None if it is another publisher's."""
+    """Returns the index of the message that this one makes obsolete; None if it may be another's."""
     for at, each in enumerate(kept):
         if each.data == sample.data:
             return at
-    if not sample.sequence:
-        return 0 if len(kept) == 1 else None
-    before = [at for at, each in enumerate(kept) if each.sequence < sample.sequence]
-    if len(kept) == 1 and before:
+    if not sample.publishers or len(kept) < sample.publishers:
+        return None
+    alone = sample.publishers == len(kept) == 1
+    if alone and (not sample.sequence or kept[0].sequence < sample.sequence):
         return 0
-    preceding = [at for at in before if kept[at].sequence == sample.sequence - 1]
+    if not sample.sequence:
+        return None
+    preceding = [at for at, each in enumerate(kept) if each.sequence == sample.sequence - 1]
     return preceding[0] if len(preceding) == 1 else None

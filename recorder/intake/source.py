@@ -1,6 +1,7 @@
 """One channel at work: its subscription, emptied without waiting, and replaced without losing a message."""
 
 from collections.abc import Hashable, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 from common.receive_time import Instant, received_at
@@ -67,6 +68,10 @@ class Source:
             self._bytes += len(each.data)
         self._messages += len(samples)
         self._emptied_at_s = now.monotonic_s
+        if samples and self.channel.latched:
+            # Afterwards: DDS discovers a publisher before its first message comes.
+            publishers = self._node.count_publishers(self.channel.topic)
+            samples = [replace(each, publishers=publishers) for each in samples]
         return samples
 
     def update(self, offers: Sequence[Any] | None, now: Instant) -> Loss | None:

@@ -18,6 +18,7 @@ from rosbags.typesys import Stores, get_typestore
 from std_msgs.msg import Int32, String
 
 from recorder.intake.intake import intake
+from recorder.intake.latched import LatchedCache
 from recorder.mcap.rosbag2 import FILE_NAME, metadata
 from recorder.mcap.writer import SegmentWriter
 from recorder.values import Ended, Loss, Sample
@@ -87,6 +88,29 @@ def test_latched_messages_reach_an_intake_that_comes_late(talker: Talker) -> Non
     (sample,) = [each for each in items if isinstance(each, Sample)]
     assert sample.channel.latched
     assert b"second" in sample.data
+
+
+def test_static_transforms_of_two_publishers_are_kept_in_any_order(talker: Talker) -> None:
+    """The defect: what the one had sent was in no later file if the other's message had a higher number."""
+    latched = QoSProfile(durability=DurabilityPolicy.TRANSIENT_LOCAL, depth=1)
+    base, arm = (talker.node.create_publisher(String, "/tf_static", latched) for _ in range(2))
+    base.publish(String(data="base"))
+    for number in range(3):
+        arm.publish(String(data=f"arm {number}"))
+    items: list[Any] = []
+    with intake({"everything": Everything()}, items.extend) as running:
+        wait_until(lambda: running._node.count_publishers("/tf_static") == 2, "both publishers")
+        running.want(frozenset({"everything"}))
+        wait_until(
+            lambda: len([each for each in list(items) if isinstance(each, Sample)]) == 2, "both messages"
+        )
+    samples = [each for each in items if isinstance(each, Sample)]
+    assert {each.publishers for each in samples} == {2}
+    for order in (samples, samples[::-1]):
+        cache = LatchedCache()
+        for each in order:
+            cache.take(each)
+        assert list(cache.samples()) == order
 
 
 def test_a_latched_topic_that_is_no_longer_taken_has_ended(talker: Talker, taken: Taken) -> None:

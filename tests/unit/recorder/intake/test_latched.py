@@ -13,8 +13,8 @@ MAP = replace(STRING, topic="/map", latched=True)
 TF = replace(STRING, topic="/tf_static", latched=True)
 
 
-def sample(number: int, text: str, channel: Channel = TF) -> Sample:
-    return replace(string_sample(number, text), channel=channel, sequence=number)
+def sample(number: int, text: str, channel: Channel = TF, publishers: int = 1) -> Sample:
+    return replace(string_sample(number, text), channel=channel, sequence=number, publishers=publishers)
 
 
 def kept(*samples: Sample) -> list[Sample]:
@@ -41,8 +41,29 @@ def test_a_publisher_that_repeats_itself_drives_out_no_other() -> None:
 
 
 def test_one_that_changes_replaces_its_own() -> None:
-    arm = sample(1, "arm")
-    assert kept(sample(7, "a"), arm, sample(8, "b"), sample(9, "c")) == [arm, sample(9, "c")]
+    arm, newest = sample(1, "arm", publishers=2), sample(9, "c", publishers=2)
+    assert kept(sample(7, "a", publishers=2), arm, sample(8, "b", publishers=2), newest) == [arm, newest]
+
+
+@pytest.mark.parametrize("numbers", [(1, 3), (3, 1), (1, 2), (2, 1), (0, 0)])
+def test_one_of_two_publishers_never_replaces_the_only_message_of_the_other(
+    numbers: tuple[int, int],
+) -> None:
+    """The defect: what had come first was missing from every later file if its number was lower."""
+    first, second = (sample(each, f"by {at}", publishers=2) for at, each in enumerate(numbers))
+    assert kept(first, second) == [first, second]
+
+
+def test_a_third_publisher_replaces_neither_of_the_others() -> None:
+    base, arm = sample(1, "base", publishers=2), sample(5, "arm", publishers=2)
+    lidar = sample(2, "lidar", publishers=3)
+    assert kept(base, arm, lidar) == [base, arm, lidar]
+    assert kept(base, arm, replace(lidar, publishers=2)) == [arm, replace(lidar, publishers=2)]
+
+
+def test_of_an_unknown_number_of_publishers_all_stay() -> None:
+    one, other = sample(1, "a", publishers=0), sample(2, "b", publishers=0)
+    assert kept(one, other) == [one, other]
 
 
 def test_channels_are_kept_apart() -> None:
