@@ -47,6 +47,7 @@ DEFAULT_PRESETS: Final[Mapping[str, PresetSettings]] = {
             "/cmd_vel*",
             "/mecanum_drive_controller/*",
             "/imu/*",
+            "/battery",
             "/battery_state",
             "/diagnostics",
             "/joint_states",

@@ -6,6 +6,7 @@ import pytest
 
 from common.config import load
 from common.errors import UserError
+from gateway.config.sources import DEFAULT_SOURCES
 from recorder.config import PresetSettings, RecorderSettings
 
 
@@ -39,6 +40,13 @@ def test_the_defaults(tmp_path: Path) -> None:
     assert settings.presets["driving"].selects("/tf_static")
     assert settings.ring.preset is None
     assert not settings.records_video("driving"), "there is no tap"
+
+
+def test_driving_has_what_the_gateway_shows_by_default_but_what_the_robot_sees(tmp_path: Path) -> None:
+    """The defect: it had no battery, whose topic was another one there."""
+    driving = loaded(tmp_path, "").presets["driving"]
+    left_out = {each.kind for each in DEFAULT_SOURCES if not driving.selects(each.topic)}
+    assert left_out == {"vision", "detections"}
 
 
 @pytest.mark.parametrize(
