@@ -222,7 +222,12 @@ class Operations:
 
     @_changing
     async def report_fault(self, fault_id: str, severity: int, message: str) -> str:
-        """Makes an incident of a fault, if the rules want one; returns its ID, or ""."""
+        """Makes an incident of a fault, if the rules want one; returns its ID, or "".
+
+        Raises:
+            PreconditionError: the ring can't be written at present.
+            TooMuchError: the disk has no room, or 16 snapshots are being made.
+        """
         if self._ring is None:
             return ""
         await self._recorder.take_reports()

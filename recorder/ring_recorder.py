@@ -252,7 +252,14 @@ class RingRecorder:
         return made
 
     async def report_fault(self, fault_id: str, severity: int, message: str) -> str:
-        """Makes an incident of a fault, or merges it with one that is being made; returns its ID, or ""."""
+        """Makes an incident of a fault, or merges it with one that is being made; returns its ID.
+
+        Returns "" if the rules want none.
+
+        Raises:
+            PreconditionError: the ring can't be written at present.
+            TooMuchError: the disk has no room, or 16 snapshots are being made.
+        """
         if not self._incidents.wanted(fault_id, severity):
             return ""
         now_s = time.monotonic()
@@ -266,13 +273,9 @@ class RingRecorder:
             await self._merge(made, fault_id)
         else:
             trigger = f"{fault_id}: {message}" if message else fault_id
-            try:
-                manifest = await self.snapshot(
-                    Kind.INCIDENT, configured.pre_s, configured.post_s, trigger=trigger
-                )
-            except (PreconditionError, TooMuchError) as error:
-                _log.warning("no incident of %s: %s", fault_id, error)
-                return ""
+            manifest = await self.snapshot(
+                Kind.INCIDENT, configured.pre_s, configured.post_s, trigger=trigger
+            )
             made = manifest.id
         self._incidents.made(fault_id, made, now_s)
         return made

@@ -8,7 +8,8 @@ from typing import Final, NoReturn
 
 from common.backoff import Backoff
 from common.broadcast import Broadcast
-from common.errors import DomainError, RecorderUnreachableError
+from common.errors import DomainError
+from common.reasons import Reason
 from gateway.links.recorder.calls import RecorderCalls
 from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.faults import cloud, recording
@@ -19,6 +20,15 @@ _WITHOUT: Final = frozenset({recording.OWN, cloud.OWN})
 """Components whose faults make no incident."""
 EXPIRED_S: Final = 30.0
 """After that the ring may not have the instant any more."""
+_PASSING: Final = frozenset(
+    {
+        Reason.RECORDER_UNREACHABLE,
+        Reason.RECORDER_NOT_READY,
+        Reason.DISK_FULL,
+        Reason.TOO_MANY_SNAPSHOTS,
+    }
+)
+"""Refusals that may be over in seconds: the recorder tries the disk again by itself, and ends snapshots."""
 _FIRST_PAUSE_S: Final = 0.2
 _LONGEST_PAUSE_S: Final = 2.0
 
@@ -28,7 +38,8 @@ class Incidents:
 
     Whether it makes an incident, the recorder's rules decide.
 
-    What the recorder does not get within EXPIRED_S is dropped. At most as many wait as faults are listed.
+    What the recorder can't take at present is reported again; what it has not taken within EXPIRED_S is
+    dropped. At most as many wait as faults are listed.
 
     Args:
         calls: to the recorder.
@@ -66,6 +77,7 @@ class Incidents:
     async def run(self) -> NoReturn:
         """Reports them, until cancelled."""
         backoff = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S)
+        refusal = ""
         while True:
             await self._added.wait_until(lambda: bool(self._waiting))
             fault_id, report = next(iter(self._waiting.items()))
@@ -73,19 +85,26 @@ class Incidents:
             if self._clock() - since_s > EXPIRED_S:
                 del self._waiting[fault_id]
                 self.expired += 1
-                _log.warning("no incident was recorded of %s: the recorder did not answer", fault_id)
+                why = refusal or "it could not be reported in time"
+                _log.warning("no incident was recorded of %s within %d s: %s", fault_id, EXPIRED_S, why)
                 continue
             try:
                 incident = await self._calls.report_fault(condition)
-            except RecorderUnreachableError:
-                await asyncio.sleep(backoff.next_s())
-                continue
             except DomainError as error:
+                if error.reason in _PASSING:
+                    if str(error) != refusal:
+                        refusal = str(error)
+                        _log.warning("no incident of %s yet, which is tried again: %s", fault_id, refusal)
+                    # The others have their turn: the recorder may want no incident of them.
+                    self._waiting[fault_id] = self._waiting.pop(fault_id)
+                    await asyncio.sleep(backoff.next_s())
+                    continue
                 _log.warning("no incident was recorded of %s: %s", fault_id, error)
             else:
                 if incident:
                     _log.info("fault %s: incident %s", fault_id, incident)
             backoff.reset()
+            refusal = ""
             # It may have become more severe meanwhile.
             if self._waiting.get(fault_id) is report:
                 del self._waiting[fault_id]

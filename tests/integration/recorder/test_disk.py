@@ -229,6 +229,25 @@ async def test_a_ring_that_is_written_again_has_no_failures_behind_it(
         await running.until(lambda: running.status_reader.ring_failures == 0)
 
 
+async def test_a_fault_while_the_ring_can_not_be_written_is_refused_and_makes_an_incident_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The defect: it was answered as a fault of which no incident is wanted, and was reported no more."""
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("recorder.writing.output.SegmentWriter", full)
+    async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
+        with pytest.raises(PreconditionError, match="the ring can't be written at present"):
+            await running.operations.report_fault("vision.silent", 3, "nothing comes")
+        assert await running.operations.report_fault("battery.low", 2, "15 %") == "", "no incident is wanted"
+        monkeypatch.undo()
+        await running.until(lambda: running.status_reader.writes)
+        made = await running.operations.report_fault("vision.silent", 3, "nothing comes")
+        assert running.status_reader.get(made).kind is Kind.INCIDENT
+
+
 async def test_a_snapshot_over_a_restart_tells_of_it(tmp_path: Path) -> None:
     ring = {"preset": "all"}
     async with running_recorder(tmp_path, ring=ring) as running:
