@@ -241,6 +241,7 @@ class Recorder:
         elif self._ring and self._ring.retries.due and not self._outputs.ring:
             # A full disk may need its own room.
             await self._parts.housekeeping.make_room(LEAST_ROOM, recordings=False)
+            await self._parts.housekeeping.make_ring_room(LEAST_ROOM)
             await self._open_ring()
         if self._lifecycle.state is not State.FAULTED and self._completions.due:
             await self._complete_faulted()
@@ -289,6 +290,8 @@ class Recorder:
         housekeeping = self._parts.housekeeping
         await housekeeping.measure(exact=False)
         need = max(LEAST_ROOM, int(self._outputs.bytes_per_s * _AHEAD_S))
+        if self._outputs.ring:
+            await housekeeping.make_ring_room(need)
         if not self._outputs.all or housekeeping.room.bytes >= need:
             return
         if await housekeeping.make_room(need, recordings=self._outputs.recording is not None):

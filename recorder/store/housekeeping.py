@@ -87,7 +87,7 @@ class Housekeeping:
         if self._expected_bytes >= need:
             return True
         deletable = await attempt(
-            "what may be deleted is unknown", lambda: self._deletable(recordings=recordings)
+            "what may be deleted is unknown", lambda: self._deletable(need, recordings=recordings)
         )
         for each, freed in deletable or ():
             if self._expected_bytes >= need:
@@ -96,6 +96,15 @@ class Housekeeping:
                 self._to_come.expect(freed, time.monotonic())
                 await self.measure()
         return self._expected_bytes >= need
+
+    async def make_ring_room(self, need: int) -> None:
+        """Drops the oldest segments of a ring on a disk of its own until there is room on that one.
+
+        Args:
+            need: in bytes.
+        """
+        if self._ring and self._settings.ring.directory:
+            await attempt("the ring's disk is not examined", lambda: self._give_way(need))
 
     async def need_room(self) -> None:
         """Makes room for something new.
@@ -138,11 +147,15 @@ class Housekeeping:
     def _expected_bytes(self) -> int:
         return self.room.bytes + self._to_come.bytes(time.monotonic())
 
-    def _deletable(self, *, recordings: bool) -> list[tuple[Keepable, int]]:
+    def _deletable(self, need: int, *, recordings: bool) -> list[tuple[Keepable, int]]:
+        disk = self.room.disk
         found = [
             Keepable(each.path.name, each.ended_ns, ring=True, files=stored([each.path]))
             for each in (self._ring.segments if self._ring else ())
         ]
+        if self._limits.disk_bytes(disk) < need:
+            # What lies elsewhere, the ring on a tmpfs, helps where the quota alone is short.
+            found = [each for each in found if all(file.inode[0] == disk.device for file in each.files)]
         if recordings:
             found += [self._keepable(manifest) for manifest in list(self._catalogue.all.values())]
         return frees(in_order(found))
@@ -159,6 +172,18 @@ class Housekeeping:
             copied=manifest.copied.state is CopyState.VERIFIED,
             files=stored(folder / file.name for file in manifest.files),
         )
+
+    def _give_way(self, need: int) -> None:
+        assert self._ring, "it is its disk"  # noqa: S101  # for the type checker
+        disk = disk_of(self._ring.directory)
+        if disk.device == disk_of(self._settings.root).device:
+            return
+        lacking = need - disk.free_bytes
+        for segment in list(self._ring.segments):
+            if lacking <= 0:
+                break
+            lacking -= sum(each.bytes for each in stored([segment.path]))
+            self._ring.drop(segment)
 
     def _let_go(self, each: Keepable) -> bool:
         """Deletes something; returns whether it was still there."""

@@ -33,10 +33,12 @@ class Disk:
     Attributes:
         free_bytes: available to this user.
         size_bytes: of the whole.
+        device: its number (stat(2)), by which two paths are in one file system or not.
     """
 
     free_bytes: int
     size_bytes: int
+    device: int = 0
 
 
 def disk_of(path: Path) -> Disk:
@@ -46,7 +48,7 @@ def disk_of(path: Path) -> Disk:
         OSError: it can't be asked.
     """
     found = os.statvfs(path)
-    return Disk(found.f_bavail * found.f_frsize, found.f_blocks * found.f_frsize)
+    return Disk(found.f_bavail * found.f_frsize, found.f_blocks * found.f_frsize, path.stat().st_dev)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,11 +65,15 @@ class Limits:
 
     def room_bytes(self, used_bytes: int, disk: Disk) -> int:
         """Returns how much may still be written; negative where something has to go."""
+        room = self.disk_bytes(disk)
+        return min(room, self.quota_bytes - used_bytes) if self.quota_bytes else room
+
+    def disk_bytes(self, disk: Disk) -> int:
+        """Returns how much the disk alone would take, whatever the quota says."""
         min_free = self.min_free_bytes
         if min_free is None:
             min_free = max(_GIB, int(disk.size_bytes * _MIN_FREE_SHARE))
-        room = disk.free_bytes - min_free
-        return min(room, self.quota_bytes - used_bytes) if self.quota_bytes else room
+        return disk.free_bytes - min_free
 
 
 def used_bytes(folders: Iterable[Path]) -> int:

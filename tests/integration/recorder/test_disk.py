@@ -20,6 +20,7 @@ from common.errors import (
     TooMuchError,
     UserError,
 )
+from recorder import ring_recorder
 from recorder.lifecycle import State
 from recorder.mcap.writer import SegmentWriter
 from recorder.requests import SnapshotOptions, StartOptions
@@ -623,6 +624,40 @@ async def test_the_ring_alone_deletes_no_recording_for_what_others_have_written(
         ballast.unlink()
         await running.until(lambda: running.status_reader.writes)
         assert running.status_reader.last_error == ""
+
+
+async def test_a_ring_on_another_disk_saves_no_recording_from_going(
+    tmp_path: Path, small_disk: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ring_recorder, "SEGMENT_S", 0.1)
+    ring = {"preset": "all", "directory": tmp_path / "ring"}
+    room = {"min_free_bytes": 8 * MIB}
+    async with running_recorder(small_disk / "root", room=room, ring=ring) as running:
+        old = await recorded(running, 8 * MIB)
+        await running.until(lambda: size_of(tmp_path / "ring") > 7 * MIB)
+        fill(small_disk, 11 * MIB + MIB // 2)
+        assert (await running.operations.start("1", StartOptions())).recording
+        assert not running.status_reader.has(old.id)
+        assert size_of(tmp_path / "ring") > 7 * MIB
+
+
+async def test_a_ring_gives_way_on_a_full_disk_of_its_own(
+    tmp_path: Path, small_disk: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The defect: it kept what it had, and could not be written."""
+    monkeypatch.setattr(ring_recorder, "SEGMENT_S", 0.1)
+    ring = {"preset": "all", "seconds": 3600, "directory": small_disk / "ring"}
+    async with running_recorder(tmp_path / "root", ring=ring) as running:
+        done = await recorded(running, 8 * MIB)
+        await running.until(lambda: size_of(small_disk / "ring") > 7 * MIB)
+        fill(small_disk, MIB)
+        await running.until(lambda: size_of(small_disk / "ring") < MIB)
+        assert running.status_reader.has(done.id)
+
+
+def size_of(ring: Path) -> int:
+    """The size of a ring's final segments."""
+    return sum(each.stat().st_size for each in ring.glob("*.mcap"))
 
 
 async def test_a_copy_that_shares_its_blocks_is_not_deleted_in_vain(small_disk: Path) -> None:
