@@ -286,15 +286,20 @@ class Recorder:
         ]
 
     async def _keep_room(self) -> None:
-        """Makes room for what is written. The ring alone deletes no recording: it gives way itself."""
+        """Makes room for what is written. The ring alone deletes no recording: it gives way itself.
+
+        What it lacks is left for it while recordings are written, which may delete older ones.
+        """
         housekeeping = self._parts.housekeeping
         await housekeeping.measure(exact=False)
         need = max(LEAST_ROOM, int(self._outputs.bytes_per_s * _AHEAD_S))
         if self._outputs.ring:
             await housekeeping.make_ring_room(need)
-        if not self._outputs.all or housekeeping.room.bytes >= need:
+        recordings = self._outputs.recording is not None
+        wanted = need + (housekeeping.ring_claim if recordings else 0)
+        if not self._outputs.all or housekeeping.room.bytes >= wanted:
             return
-        if await housekeeping.make_room(need, recordings=self._outputs.recording is not None):
+        if await housekeeping.make_room(need, recordings=recordings):
             return
         if self._lifecycle.state is State.RECORDING:
             await self.end(StopReason.DISK)

@@ -17,7 +17,7 @@ from recorder.outputs import Outputs
 from recorder.retries import Retries
 from recorder.store.catalogue import Catalogue
 from recorder.store.folder import new_id
-from recorder.store.housekeeping import Housekeeping, attempt
+from recorder.store.housekeeping import LEAST_ROOM, Housekeeping, attempt
 from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason
 from recorder.store.ring import SEGMENT_S, Ring, RingSegment, link_next
 from recorder.store.salvage import ended
@@ -120,6 +120,11 @@ class RingRecorder:
     def held_s(self) -> int:
         """Seconds that the ring holds."""
         return int(self._ring.held_ns(time.monotonic_ns()) / _NS_PER_S)
+
+    @property
+    def short(self) -> bool:
+        """Whether it holds less than it is to keep, for want of room."""
+        return self._ring.is_short(time.monotonic_ns())
 
     @property
     def next_due_s(self) -> float | None:
@@ -248,6 +253,8 @@ class RingRecorder:
         for each in segments:
             snapshot.takes(each)
         self._pending.append(snapshot)
+        # The files that it has stay: the ring needs as much room once more.
+        await self._housekeeping.make_room(LEAST_ROOM)
         _log.info("%s %s is being made: %s", kind, made.id, trigger or "requested")
         return made
 

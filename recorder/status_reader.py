@@ -100,8 +100,9 @@ class StatusReader:
 
     @property
     def disk_short(self) -> bool:
-        """Whether there is room for less than an hour, or a recording has ended for want of it."""
-        if self._parts.lifecycle.stopped_by_disk:
+        """Whether room for less than an hour is left, the ring had to give way, or a recording to end."""
+        parts = self._parts
+        if parts.lifecycle.stopped_by_disk or (parts.ring and parts.ring.short):
             return True
         if not self.room.disk.size_bytes:
             return False  # It has not been measured yet.

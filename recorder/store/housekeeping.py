@@ -27,10 +27,17 @@ WALK_EVERY_S: Final = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """The disk, as measured last. `bytes` may still be written."""
+    """The disk, as measured last.
+
+    Attributes:
+        bytes: that may still be written.
+        disk: itself.
+        ring_lacks_bytes: how much the ring still grows there until it holds all that is to be kept.
+    """
 
     bytes: int = 0
     disk: Disk = field(default=Disk(0, 0))
+    ring_lacks_bytes: int = 0
 
 
 class Housekeeping:
@@ -76,6 +83,7 @@ class Housekeeping:
     async def make_room(self, need: int, *, recordings: bool = True) -> bool:
         """Deletes in the order of retention until there is room; returns whether there is.
 
+        Recordings go until there is room for what the ring still lacks, too: for itself it deletes none.
         Some file systems give the room back only later, as all do of a file that is being exported: for half
         a minute it counts as room, so that no further recording goes for it.
 
@@ -84,13 +92,14 @@ class Housekeeping:
             recordings: whether they may go, too; else segments of the ring alone.
         """
         await self.measure()
-        if self._expected_bytes >= need:
+        with_ring = need + (self.ring_claim if recordings else 0)
+        if self._expected_bytes >= with_ring:
             return True
         deletable = await attempt(
             "what may be deleted is unknown", lambda: self._deletable(need, recordings=recordings)
         )
         for each, freed in deletable or ():
-            if self._expected_bytes >= need:
+            if self._expected_bytes >= (need if each.ring else with_ring):
                 break
             if await attempt(f"{each.name} stays", lambda each=each: self._let_go(each)):  # type: ignore[misc]
                 self._to_come.expect(freed, time.monotonic())
@@ -119,6 +128,11 @@ class Housekeeping:
             )
 
     @property
+    def ring_claim(self) -> int:
+        """What recordings leave for the ring, as long as one may be deleted for it."""
+        return self.room.ring_lacks_bytes if self.deletable_bytes else 0
+
+    @property
     def deletable_bytes(self) -> int:
         """What recordings take that may be deleted to make room; a file that several share counts once."""
         if self._summed_at != self._catalogue.revision:
@@ -134,7 +148,18 @@ class Housekeeping:
     def _measured(self, *, exact: bool) -> Room:
         disk = disk_of(self._settings.root)
         used = self._used(disk, exact=exact) if self._limits.quota_bytes else 0
-        return Room(self._limits.room_bytes(used, disk), disk)
+        return Room(self._limits.room_bytes(used, disk), disk, self._ring_lacks(disk))
+
+    def _ring_lacks(self, disk: Disk) -> int:
+        if self._ring is None:
+            return 0
+        # What a snapshot has, too, stays when the ring lets it go: the ring takes that room anew.
+        files = stored(each.path for each in list(self._ring.segments))
+        if not files or files[0].inode[0] != disk.device:
+            return 0
+        lacks = self._ring.full_bytes() - sum(each.bytes for each in files if each.links == 1)
+        # A burst of some seconds says little of an hour: the ring asks for more when it holds more.
+        return max(0, min(lacks, sum(each.bytes for each in files)))
 
     def _used(self, disk: Disk, *, exact: bool) -> int:
         now_s = time.monotonic()
@@ -183,7 +208,7 @@ class Housekeeping:
             if lacking <= 0:
                 break
             lacking -= sum(each.bytes for each in stored([segment.path]))
-            self._ring.drop(segment)
+            self._ring.give_up(segment)
 
     def _let_go(self, each: Keepable) -> bool:
         """Deletes something; returns whether it was still there."""
@@ -191,7 +216,7 @@ class Housekeeping:
             _log.warning("deleted %s to make room", each.name)
             self._catalogue.delete(manifest)
             return True
-        return self._ring is not None and self._ring.drop_named(each.name)
+        return self._ring is not None and self._ring.give_up_named(each.name)
 
 
 def _may_go(manifest: Manifest) -> bool:

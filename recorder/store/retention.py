@@ -53,7 +53,7 @@ class Keepable:
 
 
 def in_order(candidates: Iterable[Keepable]) -> list[Keepable]:
-    """Returns what may be deleted: the ring, then what has been copied, then the rest; the oldest first."""
+    """Returns what may be deleted: what has been copied, then the rest, then the ring; the oldest first."""
     return sorted((each for each in candidates if each.may_go), key=_rank)
 
 
@@ -78,5 +78,5 @@ def frees(order: Sequence[Keepable]) -> list[tuple[Keepable, int]]:
 
 
 def _rank(each: Keepable) -> tuple[int, int, int, str]:
-    group = 0 if each.ring else 1 if each.copied else 2
+    group = 2 if each.ring else 0 if each.copied else 1
     return group, each.ordinal, each.ended_ns, each.name

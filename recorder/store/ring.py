@@ -24,6 +24,8 @@ from recorder.values import Gap, GapCause, SegmentSummary
 _log = logging.getLogger(__name__)
 
 SEGMENT_S: Final = 10.0
+_MEASURED_NS: Final = int(SEGMENT_S * 1_000_000_000)
+"""What is shorter counts as that long where the rate is measured."""
 _NAME: Final = re.compile(r"\d{8}\.mcap")
 _WITHOUT_LINKS: Final = (errno.EXDEV, errno.EPERM, errno.EMLINK, errno.EOPNOTSUPP)
 """link(2): between file systems, on one without hard links (FAT), or too many of one file already."""
@@ -76,6 +78,8 @@ class Ring:
         self._loaded_ns = 0
         self._left = 0
         """Segments with lower numbers are of a former process."""
+        self._cut_ns: int | None = None
+        """When a segment went for want of room."""
         self._damaged: set[int] = set()
         """Numbers of segments that lack messages, or all of them."""
         self.segments: list[RingSegment] = []
@@ -162,16 +166,38 @@ class Ring:
         self.segments.remove(segment)
         segment.path.unlink(missing_ok=True)
 
-    def drop_named(self, name: str) -> bool:
-        """Deletes the segment whose file has that name; returns whether there was one.
+    def give_up(self, segment: RingSegment) -> None:
+        """Deletes a segment for want of room.
+
+        Raises:
+            OSError: the disk fails.
+        """
+        if not self.is_short(now_ns := time.monotonic_ns()):
+            _log.warning("%s has no room for all that the ring is to keep: it is shorter", self.directory)
+        self._cut_ns = now_ns
+        self.drop(segment)
+
+    def give_up_named(self, name: str) -> bool:
+        """Deletes the segment whose file has that name, for want of room; returns whether there was one.
 
         Raises:
             OSError: the disk fails.
         """
         found = [each for each in self.segments if each.path.name == name]
         for segment in found:
-            self.drop(segment)
+            self.give_up(segment)
         return bool(found)
+
+    def is_short(self, now_ns: int) -> bool:
+        """Returns whether it lacks something of what it is to keep, for want of room."""
+        return self._cut_ns is not None and now_ns - self._cut_ns < self._kept_ns
+
+    def full_bytes(self) -> int:
+        """Returns what it takes when it holds all that is to be kept, by what it holds; 0 if unknown."""
+        segments = list(self.segments)
+        # A single one that was cut short says little.
+        span_ns = max(sum(each.ended_ns - each.began_ns for each in segments), _MEASURED_NS)
+        return sum(each.summary.size for each in segments) * self._kept_ns // span_ns
 
     def within(self, from_ns: int, until_ns: int) -> list[RingSegment]:
         """Returns the segments of which a part lies in a window, in order."""

@@ -660,6 +660,43 @@ def size_of(ring: Path) -> int:
     return sum(each.stat().st_size for each in ring.glob("*.mcap"))
 
 
+async def test_a_recording_on_a_full_disk_leaves_the_ring_what_it_holds(
+    small_disk: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The defect: a robot that has recorded for weeks, and is at its limit, had no ring."""
+    monkeypatch.setattr(ring_recorder, "SEGMENT_S", 0.1)
+    ring = {"preset": "all", "seconds": 3600}
+    room = {"min_free_bytes": 8 * MIB}
+    async with running_recorder(small_disk / "root", room=room, ring=ring) as running:
+        old = await recorded(running, MIB // 2)
+        await running.until(lambda: size_of(small_disk / "root" / "ring") > 400_000)
+        await running.operations.start("1", StartOptions())
+        assert running.status_reader.has(old.id)
+        fill(small_disk, 11 * MIB + 3 * MIB // 4)
+        await running.until(lambda: not running.status_reader.has(old.id))
+        assert size_of(small_disk / "root" / "ring") > 400_000
+        assert running.status_reader.running
+
+
+async def test_a_ring_that_gives_way_is_short_of_room(
+    small_disk: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ring_recorder, "SEGMENT_S", 0.1)
+    ring = {"preset": "all", "seconds": 3600}
+    room = {"min_free_bytes": 8 * MIB}
+    async with running_recorder(small_disk / "root", room=room, ring=ring) as running:
+        done = await recorded(running, MIB // 2)
+        await running.until(lambda: size_of(small_disk / "root" / "ring") > 400_000)
+        await running.until(lambda: not running.status_reader.disk_short)
+        # Another program's: no recording goes for that.
+        ballast = fill(small_disk, 9 * MIB)
+        await running.until(lambda: size_of(small_disk / "root" / "ring") < 400_000)
+        ballast.unlink()
+        await running.until(lambda: running.status_reader.room.bytes > 10 * MIB)
+        assert running.status_reader.disk_short, "for as long as it holds less than it should"
+        assert running.status_reader.has(done.id)
+
+
 async def test_a_copy_that_shares_its_blocks_is_not_deleted_in_vain(small_disk: Path) -> None:
     room = {"min_free_bytes": 8 * MIB}
     async with running_recorder(small_disk / "root", room=room) as running:

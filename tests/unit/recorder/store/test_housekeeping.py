@@ -12,12 +12,15 @@ from recorder.mcap.writer import SegmentWriter
 from recorder.store import housekeeping
 from recorder.store.catalogue import Catalogue
 from recorder.store.housekeeping import WALK_EVERY_S, Housekeeping
-from recorder.store.ring import Ring
+from recorder.store.manifest import Kind, Manifest, RecordingState
+from recorder.store.ring import Ring, RingSegment
 from recorder.store.room import Disk
+from recorder.values import SegmentSummary
 from tests.support.clock import Clock
 from tests.support.segments import string_sample
 
 MIB = 1024 * 1024
+SEGMENT_NS = 10 * 1_000_000_000
 
 
 class Ground:
@@ -134,3 +137,90 @@ async def test_a_ring_gives_way_on_its_own_disk_as_much_as_is_needed(
     assert ground.numbers == [0, 1]
     await ground.housekeeping.make_ring_room(1000 * MIB + 1)
     assert ground.numbers == [1]
+
+
+class Together:
+    """A ring of up to six segments of 100 KB, beside recordings of 300 KB, on a full disk."""
+
+    def __init__(
+        self, root: Path, monkeypatch: pytest.MonkeyPatch, *, held: int = 1, pinned: bool = False
+    ) -> None:
+        disk = Disk(0, 2000 * MIB, root.stat().st_dev)
+        monkeypatch.setattr(housekeeping, "disk_of", lambda _path: disk)
+        self.catalogue = Catalogue(root)
+        for number in range(1, 5):
+            manifest = Manifest(
+                id=f"20260101T00000{number}Z-aaaaaa",
+                ordinal=number,
+                kind=Kind.MANUAL,
+                state=RecordingState.COMPLETE,
+                pinned=pinned,
+            )
+            folder = self.catalogue.create(manifest)
+            summary = self._summary(folder / "data" / "000000.mcap", 300_000, number)
+            self.catalogue.write(manifest.with_segment("data/000000.mcap", summary))
+        (root / "ring").mkdir()
+        self.ring = Ring(root / "ring", 60)
+        for number in range(held):
+            began_ns = number * SEGMENT_NS
+            summary = self._summary(root / "ring" / Ring.name(number), 100_000, 0)
+            self.ring.add(RingSegment(number, began_ns, began_ns + SEGMENT_NS, 0, summary))
+        values: dict[str, Any] = {
+            "root": root,
+            "ring": {"preset": "driving"},
+            "room": {"min_free_bytes": 0},
+        }
+        self.housekeeping = Housekeeping(RecorderSettings(**values), self.catalogue, self.ring)
+
+    @staticmethod
+    def _summary(path: Path, size: int, number: int) -> SegmentSummary:
+        path.write_bytes(bytes([number]) * size)
+        return SegmentSummary(path, size, f"{number:064x}", 1, (), 0, SEGMENT_NS, ())
+
+
+async def test_recordings_leave_the_ring_the_room_that_it_lacks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ground = Together(tmp_path, monkeypatch)
+    assert await ground.housekeeping.make_room(250_000)
+    assert [each.ordinal for each in ground.catalogue.all.values()] == [3, 4]
+    assert len(ground.ring.segments) == 1
+
+
+@pytest.mark.parametrize(("held", "claim"), [(1, 1), (2, 2), (4, 2), (6, 0)])
+async def test_the_ring_claims_what_it_lacks_but_no_more_than_it_holds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, held: int, claim: int
+) -> None:
+    ground = Together(tmp_path, monkeypatch, held=held)
+    await ground.housekeeping.measure()
+    assert ground.housekeeping.ring_claim == pytest.approx(claim * 100_000, rel=0.1)
+
+
+async def test_a_ring_that_lacks_room_costs_nothing_where_no_recording_may_go(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ground = Together(tmp_path, monkeypatch, pinned=True)
+    await ground.housekeeping.measure()
+    assert ground.housekeeping.ring_claim == 0
+    assert not await ground.housekeeping.make_room(200_000)
+    assert len(ground.catalogue.all) == 4
+    assert ground.ring.segments == [], "it goes before a recording is refused"
+
+
+async def test_the_ring_alone_deletes_no_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ground = Together(tmp_path, monkeypatch)
+    assert await ground.housekeeping.make_room(50_000, recordings=False)
+    assert len(ground.catalogue.all) == 4
+    assert ground.ring.segments == []
+
+
+async def test_what_snapshots_have_of_the_ring_is_lacking_as_well(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ground = Together(tmp_path, monkeypatch, held=6)
+    await ground.housekeeping.measure()
+    assert ground.housekeeping.ring_claim == 0
+    for each in ground.ring.segments[:3]:
+        (tmp_path / each.path.name).hardlink_to(each.path)
+    await ground.housekeeping.measure()
+    assert ground.housekeeping.ring_claim == pytest.approx(300_000, rel=0.1)

@@ -41,9 +41,9 @@ def test_there_is_room_whenever_something_may_go(candidates: list[Keepable], nee
 
 
 @given(keepables)
-def test_the_ring_first_then_copies_then_the_oldest(candidates: list[Keepable]) -> None:
+def test_copies_first_then_the_oldest_then_the_ring(candidates: list[Keepable]) -> None:
     order = in_order(candidates)
-    groups = [0 if each.ring else 1 if each.copied else 2 for each in order]
+    groups = [2 if each.ring else 0 if each.copied else 1 for each in order]
     assert groups == sorted(groups)
     for group in range(3):
         ages = [each.ended_ns for each, its in zip(order, groups, strict=True) if its == group]
