@@ -12,7 +12,12 @@ from common.findings import Finding, good, note, wrong
 from common.ros_transport_findings import transport_finding
 from common.start_command import start_command
 from recorder.config import RecorderSettings
-from recorder.doctor.judgement import folder_findings, preset_findings, program_findings
+from recorder.doctor.judgement import (
+    bundle_findings,
+    folder_findings,
+    preset_findings,
+    program_findings,
+)
 from recorder.rpc.client import newest_state
 from recorder.store.room import Limits, disk_of, used_bytes
 
@@ -27,6 +32,8 @@ def examine(config_file: Path | None) -> Iterator[Finding]:
     if settings is None:
         return
     yield from _folder(settings)
+    for each in settings.run_bundles:
+        yield from bundle_findings(each, _unreadable(each))
     try:
         yield from program_findings(newest_state(settings.socket))
     except grpc.RpcError as error:
@@ -60,6 +67,15 @@ def _folder(settings: RecorderSettings) -> Iterator[Finding]:
     room = Limits(settings.room.quota_bytes, settings.room.min_free_bytes)
     free = room.room_bytes(used_bytes(settings.folders), disk_of(existing))
     yield from folder_findings(settings, free, writable=os.access(existing, os.W_OK | os.X_OK))
+
+
+def _unreadable(folder: Path) -> str:
+    """Returns why a folder can't be read; empty if it can."""
+    try:
+        next(folder.iterdir(), None)
+    except OSError as error:
+        return error.strerror or str(error)
+    return ""
 
 
 def _graph(settings: RecorderSettings) -> Iterator[Finding]:

@@ -1,6 +1,7 @@
 """From facts to findings: what is wrong, why it matters, what to do. Pure."""
 
 from collections.abc import Collection, Iterator, Mapping
+from pathlib import Path
 from typing import Final
 
 from common.findings import Finding, good, note, wrong
@@ -40,6 +41,25 @@ def folder_findings(settings: RecorderSettings, room_bytes: int, *, writable: bo
         )
     else:
         yield good("ring", f"the ring keeps {settings.ring.seconds} s of {settings.ring.preset}")
+
+
+def bundle_findings(folder: Path, problem: str) -> Iterator[Finding]:
+    """Yields whether a folder of the robot's own experiments can be read.
+
+    Args:
+        folder: one of `run_bundles`.
+        problem: why it can't be read; empty if it can.
+    """
+    if problem:
+        yield wrong(
+            "run_bundles",
+            f"{folder} can't be read: {problem}",
+            "The experiments in it are neither listed nor exported",
+            "Let the recorder's user read it, where the recorder runs: a container needs a mount, and a "
+            "systemd unit sees nothing below /home (docs/recording.md)",
+        )
+    else:
+        yield good("run_bundles", f"{folder} can be read")
 
 
 def program_findings(state: recorder_pb.WatchStateResponse) -> Iterator[Finding]:

@@ -155,7 +155,8 @@ def bundle(found: Bundle) -> pb.Recording:
 def _unlisted(files: int) -> str:
     """Returns what a run bundle lacks here, so that it is not taken for whole."""
     many = f"{files} of its files are" if files > 1 else "one of its files is"
-    return f"{many} not listed: names too long, or not printable; copy them on the robot" if files else ""
+    why = "links, or names too long or not printable"
+    return f"{many} not listed: {why}; copy them on the robot" if files else ""
 
 
 def status(status_reader: StatusReader, settings: RecorderSettings) -> pb.RecordingStatus:

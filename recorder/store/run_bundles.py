@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Final
+from typing import Final, NoReturn
 
 from recorder.store.manifest import RecordingState
 
@@ -63,7 +63,7 @@ class Bundle:
     began_ns: int
     ended_ns: int
     unlisted: int = 0
-    """Files whose names are too long, or can't be printed: they can't be requested."""
+    """Names that can't be requested: too long, not printable, or of no plain file, as a link's."""
 
     @property
     def size(self) -> int:
@@ -89,7 +89,7 @@ class RunBundles:
     """Finds bundles in the configured folders. Its methods read the disk: they are for threads.
 
     Args:
-        folders: that hold bundles. One that does not exist has none.
+        folders: that hold bundles. One that can't be read has none, which the log says.
     """
 
     def __init__(self, folders: Sequence[Path]) -> None:
@@ -98,16 +98,15 @@ class RunBundles:
         """Folders of which the log says that they are not listed."""
 
     def all(self) -> list[Bundle]:
-        """Returns all bundles, without those that can't be read, or have more than MAX_FILES files."""
+        """Returns all bundles, without those that can't be read whole, or have more than MAX_FILES files."""
         found: dict[str, Bundle] = {}
         for folder in self._candidates():
             try:
                 bundle = _read(folder)
-            except TooManyFilesError as error:
-                self._refuse(folder, error)
+            except OSError as error:
+                if not isinstance(error, FileNotFoundError):  # That one has gone meanwhile.
+                    self._refuse(folder, error)
                 continue
-            except OSError:
-                continue  # Gone, or another user's.
             found.setdefault(bundle.id, bundle)
             if len(found) >= _MAX_BUNDLES:
                 break
@@ -124,24 +123,45 @@ class RunBundles:
                 return None
         return None
 
-    def _refuse(self, folder: Path, error: TooManyFilesError) -> None:
+    def _refuse(self, folder: Path, error: OSError) -> None:
         """Logs once that a folder is not listed."""
         if folder not in self._refused:
             self._refused.add(folder)
-            _log.warning("%s is not listed: %s", folder, error)
+            where = f"{error.filename}: {error.strerror}" if error.filename else error
+            _log.warning("%s is not listed: %s", folder, where)
 
     def _candidates(self, bundle_id: str = "") -> Iterator[Path]:
         """Yields the folders that are bundles: those with an ID, or all."""
         for parent in self._folders:
             try:
                 entries = sorted(parent.iterdir())
-            except OSError:
+            except OSError as error:
+                self._refuse(parent, error)
                 continue
             for each in entries:
                 if bundle_id and _id_of(each.name) != bundle_id:
                     continue
-                if not each.is_symlink() and (each / _MANIFEST).is_file():
+                try:
+                    is_bundle = _is_bundle(each)
+                except OSError as error:  # Another user's, which must not cost the others.
+                    self._refuse(each, error)
+                    continue
+                if is_bundle:
                     yield each
+
+
+def _is_bundle(folder: Path) -> bool:
+    """Returns whether a folder is a bundle.
+
+    Raises:
+        OSError: it can't be looked into.
+    """
+    if folder.is_symlink():
+        return False
+    try:
+        return stat.S_ISREG((folder / _MANIFEST).stat().st_mode)
+    except (FileNotFoundError, NotADirectoryError):
+        return False
 
 
 def _id_of(name: str) -> str:
@@ -159,10 +179,12 @@ def _read(folder: Path) -> Bundle:
     """
     with (folder / _MANIFEST).open("rb") as file:
         stated = _STATE.search(file.read(_MANIFEST_BYTES))
-    found = list(islice(_files(folder), MAX_FILES + 1))
+    found = list(islice(_entries(folder), MAX_FILES + 1))
     if len(found) > MAX_FILES:
         raise TooManyFilesError(f"it has more than {MAX_FILES} files; split it, or copy it by other means")
-    files = sorted((each for each in found if _is_requestable(each.name)), key=lambda each: each.name)
+    files = sorted(
+        (each for each in found if each and _is_requestable(each.name)), key=lambda each: each.name
+    )
     # Any file system may have files from before 1970.
     times = [max(each.changed_ns, 0) for each in files]
     return Bundle(
@@ -176,14 +198,24 @@ def _read(folder: Path) -> Bundle:
     )
 
 
-def _files(folder: Path) -> Iterator[BundleFile]:
-    for directory, _, names in os.walk(folder):
-        for name in names:
+def _entries(folder: Path) -> Iterator[BundleFile | None]:
+    """Yields the files below a folder, and None for each name that is neither a plain file nor a folder.
+
+    Raises:
+        OSError: a folder below can't be read: without it, a part would pass for the whole.
+    """
+    for directory, folders, names in os.walk(folder, onerror=_fail):
+        for name in (*names, *folders):
             path = Path(directory) / name
             status = path.lstat()
-            relative = path.relative_to(folder).as_posix()
             if stat.S_ISREG(status.st_mode):
-                yield BundleFile(relative, status.st_size, status.st_mtime_ns)
+                yield BundleFile(path.relative_to(folder).as_posix(), status.st_size, status.st_mtime_ns)
+            elif not stat.S_ISDIR(status.st_mode):
+                yield None
+
+
+def _fail(error: OSError) -> NoReturn:
+    raise error
 
 
 def _is_requestable(name: str) -> bool:

@@ -1,6 +1,9 @@
 """Folders of the robot's own experiments: whole, or not listed."""
 
+import errno
+import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -37,9 +40,67 @@ def test_files_whose_names_can_t_be_requested_are_counted(tmp_path: Path) -> Non
     deep.mkdir(parents=True)
     (deep / "f").touch()
     (folder / "link").symlink_to("manifest.yaml")
+    (folder / "elsewhere").symlink_to(tmp_path)
     (found,) = RunBundles((tmp_path,)).all()
     assert [file.name for file in found.files] == ["manifest.yaml"]
-    assert found.unlisted == 2
+    assert found.unlisted == 4
+
+
+def test_a_folder_that_can_be_read_in_part_is_not_listed_as_if_that_were_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The defect: without what could not be read it was exported, and reported as verified."""
+    locked = tmp_path / "first" / "logs"
+    locked.mkdir(parents=True)
+    (locked / "run.log").touch()
+    (tmp_path / "first" / "manifest.yaml").write_text("state: complete\n", encoding="utf-8")
+    scandir = os.scandir
+
+    def refusing(path: Any) -> Any:
+        if Path(path) == locked:
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+        return scandir(path)
+
+    bundles = RunBundles((tmp_path,))
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "scandir", refusing)
+        for _ in range(2):
+            assert bundles.all() == []
+            assert bundles.get("run-first") is None
+    assert caplog.messages == [f"{tmp_path / 'first'} is not listed: {locked}: Permission denied"]
+    (found,) = bundles.all()
+    assert [file.name for file in found.files] == ["logs/run.log", "manifest.yaml"]
+
+
+def test_a_folder_of_another_user_costs_no_other_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The defect: it kept all recordings from being listed."""
+    for name in ("mine", "private"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "manifest.yaml").write_text("state: complete\n", encoding="utf-8")
+    stat = os.stat
+
+    def refusing(path: Any, **options: Any) -> Any:
+        if "private/" in str(path):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+        return stat(path, **options)
+
+    monkeypatch.setattr(os, "stat", refusing)
+    (found,) = RunBundles((tmp_path,)).all()
+    assert found.folder == tmp_path / "mine"
+    private = tmp_path / "private"
+    assert caplog.messages == [f"{private} is not listed: {private}/manifest.yaml: Permission denied"]
+
+
+def test_a_configured_folder_that_is_not_there_is_in_the_log(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    gone = tmp_path / "runs"
+    bundles = RunBundles((gone,))
+    for _ in range(2):
+        assert bundles.all() == []
+    assert caplog.messages == [f"{gone} is not listed: {gone}: No such file or directory"]
 
 
 @pytest.mark.parametrize(
