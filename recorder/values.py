@@ -50,6 +50,8 @@ class Sample:
     """When it was received, by CLOCK_MONOTONIC."""
     publishers: int = 0
     """Of a latched channel: how many publishers its topic had when this message was there; 0 if unknown."""
+    follows: bool = False
+    """Whether it is useless without the one before it: a frame of the video at which no decoder can begin."""
 
 
 class GapCause(Enum):

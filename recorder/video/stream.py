@@ -134,11 +134,11 @@ class Stream:
         if codec is None:
             raise MalformedRecordError("an access unit before its codec is known")
         captured_ns = _calendar(header.captured_ns, now)
-        if self._awaits_key_frame:
-            # Only here it matters that the flag is right: what follows can be decoded from here on, or not.
-            if not header.key_frame or not access_unit.content(codec, unit).decodable:
-                return []
-            self._awaits_key_frame = False
+        # The flag alone says too little: a decoder can begin here, or not.
+        follows = not (header.key_frame and access_unit.content(codec, unit).decodable)
+        if self._awaits_key_frame and follows:
+            return []
+        self._awaits_key_frame = False
         sample = Sample(
             channel=self._channel,
             data=message.encode(captured_ns, FRAME_ID, unit, codec.value),
@@ -146,6 +146,7 @@ class Stream:
             publish_time_ns=captured_ns,
             sequence=0,
             monotonic_ns=now.monotonic_ns,
+            follows=follows,
         )
         self.frames += 1
         self._last_ns = captured_ns

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-from recorder.values import Channel, Ended, GapCause, Item, Loss, Note, Sample
+from recorder.values import VIDEO_TOPIC, Channel, Ended, GapCause, Item, Loss, Note, Sample
 
 _OVERHEAD_BYTES: Final = 256
 """Of a message's objects in memory, roughly."""
@@ -16,8 +16,10 @@ class SampleQueue:
     """Takes messages from any thread and hands them to one that writes.
 
     When it is full, the new messages are dropped, and one Loss for each of their channels follows as soon
-    as the writer has caught up. Losses of others are merged by channel and cause meanwhile, and of the
-    notes with one name the newest is kept: neither grows without bound.
+    as the writer has caught up. After a frame of the video those that follow it are dropped as well, up to
+    the next one at which a decoder can begin: without it they would be decoded into wrong pictures. Losses
+    of others are merged by channel and cause meanwhile, and of the notes with one name the newest is kept:
+    neither grows without bound.
 
     Args:
         max_bytes: what waits at most.
@@ -34,6 +36,8 @@ class SampleQueue:
         self._notes: dict[str, Note] = {}
         self._changed = threading.Condition()
         self._woken = False
+        self._awaits_key_frame = False
+        """Whether a frame of the video was dropped, and none has come since at which a decoder can begin."""
         self.dropped = 0
 
     def put(self, items: Sequence[Item]) -> None:
@@ -63,12 +67,16 @@ class SampleQueue:
 
     def _put(self, item: Item) -> None:
         size = _OVERHEAD_BYTES + (len(item.data) if isinstance(item, Sample) else 0)
+        is_frame = isinstance(item, Sample) and item.channel.topic == VIDEO_TOPIC
+        cut_off = isinstance(item, Sample) and item.follows and self._awaits_key_frame
         # One message may be larger than the whole queue.
-        if not self._items or self._bytes + size <= self._max_bytes:
+        if not cut_off and (not self._items or self._bytes + size <= self._max_bytes):
             self._items.append(item)
             self._bytes += size
+            self._awaits_key_frame = self._awaits_key_frame and not is_frame
         elif isinstance(item, Sample):
             self.dropped += 1
+            self._awaits_key_frame = self._awaits_key_frame or is_frame
             at_ns = item.log_time_ns
             self._merge(Loss(item.channel, GapCause.QUEUE, at_ns, at_ns, 1))
         elif isinstance(item, Loss):

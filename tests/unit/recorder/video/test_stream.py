@@ -62,6 +62,12 @@ def test_an_access_unit_is_stamped_by_both_clocks() -> None:
     assert (sample.log_time_ns, sample.monotonic_ns) == (run.now.calendar_ns, run.now.monotonic_ns)
 
 
+def test_a_frame_says_whether_a_decoder_can_begin_at_it() -> None:
+    run = Run()
+    found = [*run.unit(), *run.unit(DELTA), *run.unit(DELTA, key=True), *run.unit()]
+    assert [each.follows for each in samples(found)] == [False, True, True, False]
+
+
 def test_an_info_is_a_note_with_both_clocks() -> None:
     (note,) = Run().info({**INFO, "bitrate_kbps": 1500})
     assert isinstance(note, Note)

@@ -2,11 +2,12 @@
 
 import threading
 import time
+from dataclasses import replace
 
 from hypothesis import given
 from hypothesis import strategies as st
 
-from recorder.values import Channel, Ended, GapCause, Item, Loss, Note, Sample
+from recorder.values import VIDEO_TOPIC, Channel, Ended, GapCause, Item, Loss, Note, Sample
 from recorder.writing.queue import SampleQueue
 
 ODOM, SCAN = (
@@ -39,6 +40,35 @@ def test_nothing_vanishes_without_a_loss(sent: list[tuple[Channel, int]]) -> Non
         assert len(losses) <= 1, "one for each channel"
         assert arrived + sum(each.messages or 0 for each in losses) == sum(to is of for to, _ in sent)
     assert queue.dropped == len(sent) - sum(isinstance(each, Sample) for each in taken)
+
+
+def test_what_follows_a_dropped_frame_is_dropped_up_to_the_next_key_frame() -> None:
+    """The defect: frames were recorded that no decoder shows as they were."""
+    video = replace(ODOM, topic=VIDEO_TOPIC)
+
+    def frame(at_ns: int, *, key: bool) -> Sample:
+        return replace(sample(video, at_ns), follows=not key)
+
+    queue = SampleQueue(800)
+    first, second = frame(0, key=True), frame(1, key=False)
+    queue.put([first, second, frame(2, key=False)])
+    assert queue.take(0) == [first, second, Loss(video, GapCause.QUEUE, 2, 2, 1)]
+    topic = sample(at_ns=3)
+    queue.put([frame(3, key=False), topic, frame(4, key=False)])
+    assert queue.take(0) == [topic, Loss(video, GapCause.QUEUE, 3, 4, 2)]
+    again = [frame(5, key=True), frame(6, key=False)]
+    queue.put(again)
+    assert queue.take(0) == again
+    assert queue.dropped == 3
+
+
+def test_a_key_frame_that_is_dropped_takes_what_follows_with_it() -> None:
+    video = replace(ODOM, topic=VIDEO_TOPIC)
+    queue = SampleQueue(400)
+    queue.put([sample(), sample(video, 1)])
+    assert queue.take(0) == [sample(), Loss(video, GapCause.QUEUE, 1, 1, 1)]
+    queue.put([replace(sample(video, 2), follows=True)])
+    assert queue.take(0) == [Loss(video, GapCause.QUEUE, 2, 2, 1)]
 
 
 def test_a_message_larger_than_the_queue_passes_alone() -> None:
