@@ -176,12 +176,15 @@ class Operations:
 
         Raises:
             NotFoundError: there is no such.
+            PreconditionError: the disk refuses to read it.
             TooMuchError: the disk refuses to keep that; it is tried again, and holds until a restart.
         """
         if earlier := self._earlier("PinRecording", request_id):
             return earlier
         await self._recorder.take_reports()
         manifest = self._status_reader.get(recording_id).model_copy(update={"pinned": pinned})
+        if recording_id in self._parts.catalogue.unread:
+            raise PreconditionError(self._parts.catalogue.problems[recording_id], Reason.RECORDER_NOT_READY)
         await self._manual.keep(manifest)
         message = f"{recording_id} is pinned" if pinned else f"{recording_id} is no longer pinned"
         if recording_id in self._parts.catalogue.unwritten:

@@ -1,5 +1,6 @@
 """All recordings on the disk, by ID: read at the start, then changed with the disk."""
 
+import errno
 import logging
 import re
 from collections.abc import Mapping
@@ -44,6 +45,7 @@ class Catalogue:
         revision: grows with every change.
         problems: by recording, for people: what keeps it from being completed.
         cut_off: folders of deleted recordings that still have files: `end_deletions` goes on.
+        unread: IDs of recordings whose manifest the disk refuses to read: it is not written over.
         unwritten: IDs of recordings whose newest manifest the disk has refused: `write_again` tries again.
     """
 
@@ -51,6 +53,7 @@ class Catalogue:
         self.revision = 0
         self.problems: dict[str, str] = {}
         self.cut_off: set[Path] = set()
+        self.unread: set[str] = set()
         self.unwritten: set[str] = set()
         self._folder = root / RECORDINGS
         self._manifests: dict[str, Manifest] = {}
@@ -84,6 +87,7 @@ class Catalogue:
         make_directory(self._folder)
         self.problems.clear()
         self.cut_off.clear()
+        self.unread.clear()
         self.unwritten.clear()
         for folder in sorted(self._folder.iterdir()):
             if not ID.fullmatch(folder.name) or folder.is_symlink() or not folder.is_dir():
@@ -91,7 +95,7 @@ class Catalogue:
             try:
                 self._read(folder)
             except OSError as error:
-                self.set_aside(_unreadable(folder), error)
+                self._leave_unread(folder, error)
 
     def set_aside(self, manifest: Manifest, error: OSError) -> None:
         """Lists a recording that the disk refuses as one that has failed, so that all others go on.
@@ -103,6 +107,21 @@ class Catalogue:
         self.problems[manifest.id] = f"{problem}; copy what it has and delete it, or check the disk"
         failed = {"state": RecordingState.FAULTED, "stop_reason": StopReason.ERROR}
         self._manifests[manifest.id] = manifest.model_copy(update=failed)
+        self.revision += 1
+
+    def _leave_unread(self, folder: Path, error: OSError) -> None:
+        """Lists a recording of which nothing is known but that it is there; the next start tries again."""
+        problem = f"recording {folder.name} can't be read: {error.strerror}"
+        _log.error("%s (%s)", problem, error)
+        self.problems[folder.name] = f"{problem}; check the disk, and restart the recorder, which tries again"
+        self.unread.add(folder.name)
+        self._manifests[folder.name] = Manifest(
+            id=folder.name,
+            kind=Kind.MANUAL,
+            state=RecordingState.FAULTED,
+            stop_reason=StopReason.ERROR,
+            pinned=True,
+        )
         self.revision += 1
 
     def create(self, manifest: Manifest) -> Path:
@@ -120,8 +139,11 @@ class Catalogue:
         """Writes a recording's manifest, and has it in place of the former one.
 
         Raises:
-            OSError: the disk is full or fails; then the memory alone has it: see `unwritten`.
+            OSError: the disk is full or fails; then the memory alone has it: see `unwritten`. Or the one that
+                is there could not be read: then all stays as it is.
         """
+        if manifest.id in self.unread:
+            raise OSError(errno.EIO, "its manifest could not be read, and is not written over", manifest.id)
         self._manifests[manifest.id] = manifest
         self.revision += 1
         self.unwritten.add(manifest.id)
@@ -211,6 +233,7 @@ class Catalogue:
     def _forget(self, manifest: Manifest) -> None:
         self._manifests.pop(manifest.id, None)
         self.problems.pop(manifest.id, None)
+        self.unread.discard(manifest.id)
         self.unwritten.discard(manifest.id)
         self.revision += 1
 
@@ -231,11 +254,6 @@ def first_free_number(folder: Path) -> int:
     """
     names = [path.name for path in (folder / DATA).iterdir()] if (folder / DATA).is_dir() else []
     return max((int(found[1]) + 1 for name in names if (found := _NUMBERED.match(name))), default=0)
-
-
-def _unreadable(folder: Path) -> Manifest:
-    """Returns what stands for a recording of which nothing is known but that it is there."""
-    return Manifest(id=folder.name, kind=Kind.MANUAL, state=RecordingState.FAULTED, pinned=True)
 
 
 def _rebuilt(folder: Path, why: str) -> Manifest | None:

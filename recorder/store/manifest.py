@@ -335,12 +335,13 @@ def read_manifest(folder: Path) -> Manifest:
     """Returns the manifest of a recording's folder.
 
     Raises:
-        DamagedManifestError: it is missing, unreadable, or another recording's.
+        DamagedManifestError: it is missing, no manifest, or another recording's.
+        OSError: the disk refuses to read it, for now perhaps: that is no damage.
     """
     try:
         with (folder / MANIFEST).open("rb") as file:
             manifest = Manifest.model_validate_json(file.read(_MAX_BYTES))
-    except OSError as error:
+    except (FileNotFoundError, IsADirectoryError) as error:
         raise DamagedManifestError(f"{error.strerror}") from error
     except ValidationError as error:
         first = error.errors(include_url=False)[0]

@@ -116,6 +116,8 @@ def salvage(catalogue: Catalogue, ring: Ring | None, boot_id: str) -> Manifest |
 
 def _salvaged(catalogue: Catalogue, manifest: Manifest, ring: Ring | None, boot_id: str) -> Manifest | None:
     """Makes one recording whole, and returns it if it is to go on."""
+    if manifest.id in catalogue.unread:
+        return None  # What would be written knows nothing of it.
     folder = catalogue.folder_of(manifest)
     if not manifest.state.open and not segments_in(folder, PART):
         return None

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -336,6 +337,41 @@ async def test_a_damaged_manifest_is_made_anew_and_kept_aside(tmp_path: Path) ->
         assert found.state is RecordingState.RECOVERED
         assert found.pinned  # It might have been.
         assert (folder / "manifest.json.damaged").read_text(encoding="utf-8") == '{"id": 7'
+
+
+@pytest.mark.parametrize("code", [errno.EIO, errno.EMFILE, errno.EACCES])
+async def test_a_manifest_that_the_disk_refuses_to_read_is_neither_damaged_nor_written_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int
+) -> None:
+    """The defect: label, notes and what was to be copied were lost by an error that is over in a moment."""
+    old, cut = await cut_off(tmp_path)
+    folder = tmp_path / "recordings" / cut.id
+    written = manifest_of(tmp_path, cut)
+    opened = Path.open
+
+    def refusing(path: Path, *args: Any, **options: Any) -> Any:
+        if path == folder / "manifest.json":
+            raise OSError(code, os.strerror(code), str(path))
+        return opened(path, *args, **options)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "open", refusing)
+        async with running_recorder(tmp_path, boot_id="another") as running:
+            assert running.status_reader.phase.state is State.IDLE
+            assert running.status_reader.get(cut.id).state is RecordingState.FAULTED
+            assert (
+                f"recording {cut.id} can't be read: {os.strerror(code)}" in running.status_reader.last_error
+            )
+            with pytest.raises(PreconditionError, match="can't be read"):
+                await running.operations.pin("1", cut.id, pinned=False)
+            await running.operations.set_copy(cut.id, Copy(state=CopyState.QUEUED))
+            assert running.status_reader.get(old.id).state is RecordingState.COMPLETE
+    assert manifest_of(tmp_path, cut) == written
+    assert not (folder / "manifest.json.damaged").exists()
+    async with running_recorder(tmp_path, boot_id="another") as running:
+        found = running.status_reader.get(cut.id)
+        assert (found.state, found.messages) == (RecordingState.RECOVERED, 10)
+        assert (found.preset, found.pinned) == ("all", False)
 
 
 async def test_a_damaged_file_beside_a_damaged_manifest_is_a_gap(tmp_path: Path) -> None:
