@@ -92,7 +92,7 @@ class PlainValue:
     def _number(self, kind: type[int] | type[float], value: Any, param: Any, ctx: Any) -> int | float:
         least, most = self.descriptor.parameter_info.min, self.descriptor.parameter_info.max
         noun = "a whole number" if kind is int else "a number"
-        limits = f" from {least:g} to {most:g}" if most is not None else f" of at least {least:g}"
+        limits = f" from {least:.15g} to {most:.15g}" if most is not None else f" of at least {least:.15g}"
         try:
             number = kind(value)
         except ValueError:

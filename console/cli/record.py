@@ -34,6 +34,10 @@ from console.presentation.recording import (
 
 _LEAST_LIMIT_MBIT: Final = 0.53
 """As the robot permits: 65536 bytes a second."""
+_MOST_LIMIT_MBIT: Final = 1e6
+_LONGEST_S: Final = (1 << 32) - 1
+_LARGEST_MB: Final = ((1 << 64) - 1) // 1_000_000
+"""What the fields of the request can say: uint32 and uint64 (bytes)."""
 record_app = typer.Typer(
     help="Record on the robot, keep its last minutes, copy recordings to this computer.",
     add_completion=False,
@@ -65,10 +69,14 @@ def start(
         typer.Option("--video/--no-video", help="With the video, or not.", show_default="as the preset says"),
     ] = None,
     max_s: Annotated[
-        int, typer.Option("--max-duration", metavar="SECONDS", min=0, help="Stop by itself; 0: never.")
+        int,
+        typer.Option(
+            "--max-duration", metavar="SECONDS", min=0, max=_LONGEST_S, help="Stop by itself; 0: never."
+        ),
     ] = 0,
     max_mb: Annotated[
-        int, typer.Option("--max-size", metavar="MB", min=0, help="Stop by itself; 0: never.")
+        int,
+        typer.Option("--max-size", metavar="MB", min=0, max=_LARGEST_MB, help="Stop by itself; 0: never."),
     ] = 0,
 ) -> None:
     """Start a recording on the robot's disk. It goes on when this computer leaves."""
@@ -202,7 +210,13 @@ def export(
     ] = False,
     limit_mbit: Annotated[
         float,
-        typer.Option("--limit", metavar="MBIT/S", min=0, help="Highest rate; 0: as the robot is configured."),
+        typer.Option(
+            "--limit",
+            metavar="MBIT/S",
+            min=0,
+            max=_MOST_LIMIT_MBIT,
+            help="Highest rate; 0: as the robot is configured.",
+        ),
     ] = 0,
 ) -> None:
     """Copy a recording to this computer, into the folder DIR/ID, and verify it.
