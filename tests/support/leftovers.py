@@ -7,6 +7,7 @@ starts carries a mark in its environment instead, and so does what that starts.
 """
 
 import gc
+import logging
 import os
 import re
 import socket
@@ -39,6 +40,19 @@ _MAY_STAY_OF_ALL: Final = Counter({_UNNAMED: 1024})
 def pytest_configure() -> None:
     """Marks this process, a worker of the run; nothing else has the same mark."""
     os.environ[_MARK] = uuid.uuid4().hex
+
+
+@pytest.fixture(autouse=True)
+def no_log_of_a_test_that_has_ended() -> Iterator[None]:
+    """Removes log handlers that a program has added in this process, and whose stream the test has closed.
+
+    Without that, the next warning in any test raises, and prints what that test takes for its own output.
+    """
+    yield
+    root = logging.getLogger()
+    for handler in root.handlers[:]:
+        if isinstance(handler, logging.StreamHandler) and getattr(handler.stream, "closed", False):
+            root.removeHandler(handler)
 
 
 @pytest.fixture(scope="session", autouse=True)
