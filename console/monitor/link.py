@@ -3,12 +3,15 @@
 import math
 from dataclasses import dataclass
 from enum import Enum
+from typing import Final
 
 from console.client import DeadlineExceeded, GatewayError, NotAllowed, NotTrusted, Unreachable
 from console.presentation.formatting import age, sentence
 from console.presentation.severity_style import SeverityStyle
 
 _MS_PER_S = 1000
+_ALARM_AFTER_S: Final = 3.0
+"""Longer than a connection that comes back at once, and than the first attempts of a window at its start."""
 
 
 class LinkState(Enum):
@@ -77,6 +80,11 @@ def link_text(link: Link, target: str, now_s: float) -> LinkText:
             retry = f"{lack} for {duration}. Attempt {link.attempts + 1} {_when(link, rejected, now_s)}."
             mark = _mark(link.error)
             return LinkText(mark, SeverityStyle.BAD, f"for {duration}", sentence(error), retry)
+
+
+def is_alarming(link: Link, now_s: float) -> bool:
+    """Whether the robot has not answered for so long that the operator must hear of it."""
+    return link.state is LinkState.LOST and now_s - link.since_s >= _ALARM_AFTER_S
 
 
 def _mark(error: GatewayError | None) -> str:

@@ -39,7 +39,7 @@ def fault_items(state: MonitorState, alarm: Alarm, now_s: float) -> list[FaultIt
     faults = state.snapshot.status.faults
     rows = fault_rows(state, now_s)
     items = [
-        FaultItem(row, occurrence(fault), alarm.is_pending(fault))
+        FaultItem(row, occurrence(fault), alarm.is_pending(occurrence(fault)))
         for row, fault in zip(rows, faults, strict=True)
     ]
     if any(fault.active for fault in faults):

@@ -34,7 +34,7 @@ class Cockpit(Protocol):
     band: PracticeBand | None
 
     def acknowledge(self) -> None:
-        """Acknowledges all faults."""
+        """Acknowledges all alarms."""
 
     def retry(self) -> None:
         """Ends the pause before the next attempt to connect."""
@@ -96,7 +96,7 @@ def cockpit_keys(cockpit: Cockpit, window: QWidget) -> Sequence[Key]:
         Key(("K",), "keep the last seconds", recording.keep),
         Key(("T",), "drive, and end driving", driving.toggle),
         Key(("Shift+R",), "reset the stop that is shown", driving.reset),
-        Key(("A",), "acknowledge all faults", cockpit.acknowledge),
+        Key(("A",), "acknowledge all alarms", cockpit.acknowledge),
         Key(("M",), "alarm sound on or off", cockpit.toggle_sound),
         Key(("R",), "retry to connect now", cockpit.retry),
         Key(("F",), "picture only, and back", arrangement.toggle_picture_only),

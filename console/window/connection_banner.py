@@ -15,6 +15,8 @@ class ConnectionBanner(TintedLine):
 
     retry = Signal()
     """The button "Retry now" was pressed."""
+    acknowledged = Signal()
+    """The button "Acknowledge" was pressed."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -22,10 +24,20 @@ class ConnectionBanner(TintedLine):
         self.button = QPushButton("&Retry now")
         self.button.setToolTip("Key R")
         self.button.clicked.connect(self.retry)
+        self.acknowledge = QPushButton("Acknowledge")
+        self.acknowledge.setAccessibleName("Acknowledge: the robot does not answer")
+        self.acknowledge.setToolTip("Mutes the alarm until the robot answers; A: for all")
+        self.acknowledge.clicked.connect(self.acknowledged)
         self.grid.addLayout(fill(QVBoxLayout(), self.text, self.next_try), 0, 1)
-        self.grid.addWidget(self.button, 0, 2)
+        # On the left: the other button keeps its place when this one appears.
+        self.grid.addWidget(self.acknowledge, 0, 2)
+        self.grid.addWidget(self.button, 0, 3)
         self.grid.setColumnStretch(1, 1)
         self.setVisible(False)
+
+    def show_pending(self, pending: bool) -> None:
+        """Shows whether the loss waits for its acknowledgement."""
+        self.acknowledge.setVisible(pending)
 
     def show_item(self, item: LinkText) -> None:
         """Shows the latest text."""

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable  # noqa: TC003  # read by the type checker alone
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -9,9 +10,9 @@ from PySide6.QtCore import QTimer
 from PySide6.QtGui import QCloseEvent, QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QVBoxLayout, QWidget
 
-from console.monitor.alarm import Alarm, Occurrence
+from console.monitor.alarm import LOST_LINK, Alarm, Occurrence
 from console.monitor.history import History, values_of
-from console.monitor.link import link_text
+from console.monitor.link import is_alarming, link_text
 from console.monitor.monitor_state import MonitorState, PreviewRequest
 from console.monitor.motion import Motion, motion
 from console.monitor.status_rows import FaultItem
@@ -126,12 +127,13 @@ class MonitorWindow(QWidget):
         frozen_s = None if playback.state is PlaybackState.LIVE else playback.frame_age_s
         stream = self.read_stream()
         self.header.show_state(state, link, now_s, self.read_picture_age(), frozen_s, stream=stream)
-        self.banner.show_item(link)
         controls = self.preview_actions.controls(state, now_s)
         self.preview.show_controls(controls)
         hidden = state.request is not None and state.request is self._dismissed
         self.toasts.show_answers(() if hidden else controls.answers)
-        self._show_faults(state)
+        self._show_alarms(state, now_s)
+        self.banner.show_pending(self.alarm.is_pending(LOST_LINK))
+        self.banner.show_item(link)
         self.side.show_state(state, controls, self.alarm, now_s, stream)
         self.driving.show_state(state)
         self.recording.show_state(state)
@@ -150,7 +152,7 @@ class MonitorWindow(QWidget):
         self._worker.retry_now()
 
     def acknowledge(self, *which: Occurrence) -> None:
-        """Acknowledges these faults, or all of them."""
+        """Acknowledges these alarms, or all of them."""
         self.alarm.acknowledge(*which)
         self.refresh()
 
@@ -240,6 +242,7 @@ class MonitorWindow(QWidget):
         self.preview.chosen.connect(self.preview_actions.choose)
         self.preview.camera_chosen.connect(self.preview_actions.choose_camera)
         self.banner.retry.connect(self.retry)
+        self.banner.acknowledged.connect(partial(self.acknowledge, LOST_LINK))
         self.side.acknowledged.connect(self._acknowledge_one)
         self.side.acknowledge.clicked.connect(self._acknowledge_all)
         self.side.sound.clicked.connect(self.toggle_sound)
@@ -257,10 +260,10 @@ class MonitorWindow(QWidget):
             plots.show_history(self._history)
         self.refresh()
 
-    def _show_faults(self, state: MonitorState) -> None:
-        """Takes the active faults; while the panel is closed, a new one appears over the picture."""
+    def _show_alarms(self, state: MonitorState, now_s: float) -> None:
+        """Takes what alarms; while the panel is closed, a new or worse fault appears over the picture."""
         faults = state.snapshot.status.faults if state.snapshot else ()
-        for fault in self.alarm.show_faults(faults):
+        for fault in self.alarm.show(faults, link_lost=is_alarming(state.link, now_s)):
             if self.side.isHidden():
                 self.toasts.show_passing(Note(fault.message, FAULT_STYLES[fault.severity]))
 

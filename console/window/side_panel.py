@@ -51,7 +51,7 @@ class SidePanel(QWidget):
         self.faults_title.setTextFormat(Qt.TextFormat.PlainText)
         set_bold(self.faults_title, True)
         self.acknowledge = QPushButton("Acknowledge &all")
-        self.acknowledge.setToolTip("Mutes the alarm for the present faults (A)")
+        self.acknowledge.setToolTip("Mutes the alarm for what is wrong now (A)")
         self.sound = QPushButton("Sound")
         self.sound.setCheckable(True)
         self.sound.setToolTip("Alarm sound on or off (M)")
@@ -78,7 +78,7 @@ class SidePanel(QWidget):
         Args:
             state: of robot and connection.
             controls: of the preview.
-            alarm: of the faults.
+            alarm: of the faults and the connection.
             now_s: on the monotonic clock.
             stream: how the pictures of this window come; None before they do.
         """

@@ -369,6 +369,26 @@ def test_a_fault_is_acknowledged_and_the_alarm_falls_silent(cockpit: Cockpit) ->
     assert not played.is_set()
 
 
+def test_a_lost_connection_alarms_until_it_is_acknowledged(cockpit: Cockpit) -> None:
+    window, played = cockpit.window, threading.Event()
+    window.sound.play = played.set
+    cockpit.press(Qt.Key.Key_M)
+    cockpit.robot.gateway.hold.clear()
+    until(played.is_set, "the loss is heard")
+    assert window.banner.acknowledge.isVisible()
+    assert window.side.acknowledge.isEnabled()
+    keep_screenshot(window, "lost-connection-alarm")
+    window.banner.acknowledge.click()
+    until(lambda: window.alarm.pending == 0 and not window.banner.acknowledge.isVisible(), "it is muted")
+    assert window.banner.isVisible()
+    cockpit.robot.gateway.hold.set()
+    until(window.banner.isHidden, "back again")
+    cockpit.robot.gateway.hold.clear()
+    until(window.banner.acknowledge.isVisible, "the next loss alarms again")
+    cockpit.press(Qt.Key.Key_A)
+    until(lambda: not window.banner.acknowledge.isVisible(), "by its key as well")
+
+
 def test_a_sound_device_that_fails_is_reported(cockpit: Cockpit) -> None:
     def fail() -> None:
         raise UserError("no alarm can be heard: no such device", "Check this computer's sound device")

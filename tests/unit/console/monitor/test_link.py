@@ -3,7 +3,7 @@
 import pytest
 
 from console.client import DeadlineExceeded, GatewayError, NotAllowed, Unreachable
-from console.monitor.link import Link, LinkState, link_text
+from console.monitor.link import Link, LinkState, is_alarming, link_text
 from console.presentation.severity_style import SeverityStyle
 
 TARGET = "lab-1:50051"
@@ -56,3 +56,13 @@ def test_who_is_refused_learns_what_would_help_and_that_the_robot_was_not_silent
     text = link_text(lost(NotAllowed("the token of anna was revoked"), 117), TARGET, 112)
     assert text.banner.startswith("The token of anna was revoked. Ask this robot's administrator")
     assert text.retry == "No access for 12.0 s. Attempt 4 in 5 s, or as soon as another login is stored."
+
+
+def test_a_loss_alarms_when_it_lasts() -> None:
+    link = lost(Unreachable("gone"), None)
+    assert [is_alarming(link, 100 + for_s) for for_s in (0, 2.9, 3, 60)] == [False, False, True, True]
+
+
+@pytest.mark.parametrize("state", [LinkState.CONNECTING, LinkState.CONNECTED])
+def test_no_other_state_alarms(state: LinkState) -> None:
+    assert not is_alarming(Link(state=state, since_s=0), 1e6)

@@ -104,7 +104,7 @@ def test_a_gateway_counts_as_up_only_while_it_answers() -> None:
 def test_a_fault_waits_for_its_acknowledgement() -> None:
     state, alarm = heard(snapshot(with_faults)), Alarm()
     assert state.snapshot
-    alarm.show_faults(state.snapshot.status.faults)
+    alarm.show(state.snapshot.status.faults)
     assert [item.pending for item in fault_items(state, alarm, NOW_S)] == [True, False]
     alarm.acknowledge()
     assert [item.pending for item in fault_items(state, alarm, NOW_S)] == [False, False]
