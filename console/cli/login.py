@@ -3,7 +3,8 @@
 import shlex
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Final, TypeVar
@@ -30,6 +31,10 @@ _LONGEST_PAUSE_S: Final = 1.0
 _RETRIES: Final = 3
 
 
+class _HasLoginError(UserError):
+    """The robot of this name has a login already."""
+
+
 def login(
     context: typer.Context,
     name: Annotated[str, typer.Argument(metavar="ROBOT", help="Name to store it under; --robot selects it.")],
@@ -50,16 +55,18 @@ def login(
 
     On one line: ssh HOST robot-gateway credentials add NAME --role operator | robotctl login ROBOT HOST:PORT
     """
-    check_name(name)
-    target = parse_target(target)
-    if not (replacing or ca):
-        _check_free(name, file)
-    user, credentials = _with_new_authority(name, ca) if ca else _read(file)
-    gateway_name = ""
-    if not offline:
-        with GatewayClient(target, credentials=credentials) as gateway:
-            gateway_name = once_known(gateway.status).gateway_name
-    known = keep_login(name, target, credentials)
+    piped = login_text(file) if not ca and file == STANDARD_INPUT and not sys.stdin.isatty() else None
+    with _accounting_for(piped):
+        check_name(name)
+        target = parse_target(target)
+        if not (replacing or ca):
+            _check_free(name)
+        user, credentials = _with_new_authority(name, ca) if ca else _read(piped or login_text(file))
+        gateway_name = ""
+        if not offline:
+            with GatewayClient(target, credentials=credentials) as gateway:
+                gateway_name = once_known(gateway.status).gateway_name
+        known = keep_login(name, target, credentials)
     out = standard_output()
     if json_requested(context, as_json):
         print_json(out, {"robot": name, "target": target, "who": user, "gateway_name": gateway_name})
@@ -92,25 +99,47 @@ def once_known(ask: Callable[[], AnswerT], sleep: Callable[[float], None] = time
         sleep(pauses.next_s())
 
 
-def _check_free(name: str, file: str) -> None:
+@contextmanager
+def _accounting_for(piped: str | None) -> Iterator[None]:
+    """Adds to an error what becomes of the login in a pipe: the robot has issued it, and nothing else has it.
+
+    Args:
+        piped: What the pipe contained; None without one.
+
+    Raises:
+        UserError: The one that was raised inside.
+    """
+    try:
+        yield
+    except UserError as error:
+        issued = _issued_in(piped)
+        if issued:
+            taken = isinstance(error, _HasLoginError)
+            cause = f"{error.remedy}. " if error.remedy and not taken else ""
+            error.what += "; the login in the pipe is not stored, but stays valid"
+            error.remedy = (
+                f"{cause}Type on the robot: robot-gateway credentials revoke {issued}; "
+                f"then repeat the whole pipe{', with --replace at its end' if taken else ''}"
+            )
+        raise
+
+
+def _issued_in(piped: str | None) -> str:
+    """Returns what revokes the login in a pipe; empty where it contained none."""
+    try:
+        return parse_login(piped or "").revoked_by
+    except UserError:
+        return ""
+
+
+def _check_free(name: str) -> None:
     known = read_robots_file().robots.get(name)
-    if not known or not any(getattr(known, key) for key in FILE_KEYS):
-        return
-    what = f"'{name}' has a login already, at {known.target}"
-    if file == STANDARD_INPUT and not sys.stdin.isatty():
-        # It was issued by what is at the other end of the pipe, and nothing else has it.
-        issued = parse_login(login_text(file)).revoked_by
-        raise UserError(
-            f"{what}; the one in the pipe is not stored, but stays valid",
-            f"Type on the robot: robot-gateway credentials revoke {issued}; "
-            "then repeat the whole pipe, with --replace at its end",
+    if known and any(getattr(known, key) for key in FILE_KEYS):
+        raise _HasLoginError(
+            f"'{name}' has a login already, at {known.target}",
+            f"Type: {shlex.join(['robotctl', *sys.argv[1:], '--replace'])}",
             exit_code=ExitCode.USAGE,
         )
-    raise UserError(
-        what,
-        f"Type: {shlex.join(['robotctl', *sys.argv[1:], '--replace'])}",
-        exit_code=ExitCode.USAGE,
-    )
 
 
 def login_text(file: str) -> str:
@@ -129,8 +158,8 @@ def login_text(file: str) -> str:
         raise UserError(f"{file} can't be read: {reason}", exit_code=ExitCode.USAGE) from error
 
 
-def _read(file: str) -> tuple[str, Credentials]:
-    login = parse_login(login_text(file))
+def _read(text: str) -> tuple[str, Credentials]:
+    login = parse_login(text)
     return ", ".join(word for word in (login.name, login.role) if word), login.credentials
 
 

@@ -217,6 +217,40 @@ def test_a_login_in_a_pipe_over_another_one_is_not_lost_unnoticed(ground: Path) 
         assert operator(ground, "status").returncode == 0
 
 
+def assert_the_piped_login_can_be_revoked(ground: Path, robot: str, host: str, says: str) -> None:
+    issued = credentials(ground, "add", "anna", "--role", "viewer")
+    with mock.patch.object(sys, "stdin", io.StringIO(issued)):
+        done = operator(ground, "login", robot, f"{host}:{port_of(ground)}")
+    assert done.returncode != 0
+    said = only_line(done.stderr)
+    assert says in said
+    assert "not stored, but stays valid" in said
+    assert said.endswith("then repeat the whole pipe")
+    revoke = re.search(r"robot-gateway credentials (revoke [0-9a-f]{12});", said)
+    assert revoke, said
+    credentials(ground, *revoke[1].split())
+    states = [each["state"] for each in json.loads(credentials(ground, "list", "--json"))]
+    assert states == ["revoked"]
+    assert not (ground / "config/robotctl").exists()
+
+
+@pytest.mark.parametrize(
+    ("robot", "says"), [("lab", "nothing listens there"), ("lab 2", "lab 2")], ids=["unreachable", "misnamed"]
+)
+def test_a_login_in_a_pipe_that_reaches_no_robot_can_be_revoked(ground: Path, robot: str, says: str) -> None:
+    """The robot has issued it, whatever becomes of it at the other end of the pipe."""
+    credentials(ground, "init")
+    assert_the_piped_login_can_be_revoked(ground, robot, "127.0.0.1", says)
+
+
+def test_a_login_in_a_pipe_to_an_address_that_the_certificate_lacks_can_be_revoked(ground: Path) -> None:
+    file = ground / "gateway.yaml"
+    file.write_text(file.read_text().replace("grpc: {", "grpc: {host: 127.0.0.2, "))
+    credentials(ground, "init")
+    with running(ground):
+        assert_the_piped_login_can_be_revoked(ground, "lab", "127.0.0.2", "is not trusted")
+
+
 def test_the_command_after_a_new_ca_is_complete(ground: Path) -> None:
     credentials(ground, "init")
     done = gateway(ground, "credentials", "rotate", "ca")
