@@ -10,14 +10,19 @@ from bridge.uploads.config import UploadSettings
 from common.config import Section, Settings
 from common.errors import UserError
 from common.socket_path import SocketPath
+from common.text_form import Form
 from console.target import DEFAULT_TARGET, parse_target
-from fleet.names import ROBOT_NAME
+from fleet.names import NAME_EXPECTED, ROBOT_NAME
 from fleet.servers import exposed_server
 
 MIB: Final = 1024 * 1024
-Name = Annotated[str, Field(pattern=f"^{ROBOT_NAME.pattern}$")]
+Name = Annotated[str, Form(ROBOT_NAME.pattern, NAME_EXPECTED)]
 """Of a robot or a fleet."""
-Server = Annotated[str, Field(pattern=r"^(tls|nats)://[^\s/@]+$", max_length=255)]
+Server = Annotated[
+    str,
+    Field(max_length=255),
+    Form(r"(tls|nats)://[^\s/@]+", "a server without a login in it, tls://hub.example:4222 for example"),
+]
 
 
 class GatewaySettings(Section):

@@ -78,10 +78,11 @@ def first_problem(error: ValidationError, settings_type: type[BaseModel], *, nou
         return Problem(location, f"unknown {noun} '{key}'{more}. {_allowed(settings_type, location)}")
     if first["type"] == "missing":
         return Problem(location, f"{noun} '{key}' is missing{more}")
-    return Problem(location, f"{noun} '{key}' is {first['input']!r}, expected: {_expected(first)}{more}")
+    return Problem(location, f"{noun} '{key}' is {first['input']!r}, expected: {expected(first)}{more}")
 
 
-def _expected(problem: ErrorDetails) -> str:
+def expected(problem: ErrorDetails) -> str:
+    """Returns what is expected in place of a wrong value."""
     kind, values = problem["type"], problem.get("ctx", {})
     if kind in {"enum", "literal_error"}:
         return _one_of(values["expected"], problem["input"])
@@ -112,7 +113,7 @@ def _allowed(settings_type: type[BaseModel], location: tuple[int | str, ...]) ->
             inner
             for model in models
             if (field := model.model_fields.get(str(part).replace("-", "_")))
-            for inner in _models_in(field.annotation)
+            for inner in models_in(field.annotation)
         ] or models
     fields = [pair for model in models for pair in model.model_fields.items()]
     allowed = list(dict.fromkeys(field.alias or name for name, field in fields))
@@ -120,8 +121,9 @@ def _allowed(settings_type: type[BaseModel], location: tuple[int | str, ...]) ->
     return (f"Did you mean '{meant[0]}'? " if meant else "") + f"Allowed: {', '.join(allowed)}"
 
 
-def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Yields the sections that an annotation has in it."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     for argument in get_args(annotation):
-        yield from _models_in(argument)
+        yield from models_in(argument)

@@ -10,6 +10,7 @@ from pydantic_settings import SettingsConfigDict
 
 from common.config import Section, Settings, SettingsConflictError
 from common.socket_path import SocketPath
+from common.text_form import Form
 from drive.inhibits import Deadlines
 from drive.machine import OnLoss, Rules
 from drive.shaping import Limits
@@ -17,7 +18,14 @@ from drive.values import MS
 
 _DEFAULT: Final = Limits()
 VelocityType = Literal["geometry_msgs/msg/TwistStamped", "geometry_msgs/msg/Twist"]
-Topic = Annotated[str, Field(max_length=247, pattern=r"^/[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$")]
+Topic = Annotated[
+    str,
+    Field(max_length=247),
+    Form(
+        "/[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*",
+        "a topic name of letters, digits, _ and / that begins with /, /odometry/filtered for example",
+    ),
+]
 """Full name of a topic; of 247 characters at the most (RMW_TOPIC_MAX_NAME_LENGTH)."""
 
 

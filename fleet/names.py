@@ -11,6 +11,8 @@ MOST_FILES: Final = 20_000
 """Of a recording: the names of so many segments take 360 KiB, which one message has room for."""
 ROBOT_NAME: Final = re.compile(r"[a-z0-9](?:[a-z0-9-]{0,61}[a-z0-9])?")
 """A robot's name, and a fleet's: a DNS label (RFC 1123 2.1), and so one token of a subject and a key."""
+NAME_EXPECTED: Final = "a name of at most 63 characters of a-z, 0-9 and -, robot-2 for example"
+"""The same for people, where a configuration has another text."""
 RECORDING_ID: Final = re.compile(r"[A-Za-z0-9_-]{1,64}")
 """Without a dot, and so one token of a key."""
 

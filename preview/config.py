@@ -20,6 +20,7 @@ from pydantic_settings import SettingsConfigDict
 from common.camera_tap import MAX_TOPIC_CHARACTERS, TOPIC_PATTERN, is_topic
 from common.config import Section, Settings
 from common.socket_path import SocketPath
+from common.text_form import Form
 from preview.encoders.catalogue import CATALOGUE, DEFAULT_ORDER, Encoder
 from preview.values import Codec, Profile, Target
 
@@ -106,7 +107,13 @@ class RosSource(AnySource):
 
 AnyKind = TestSource | V4l2Source | FileSource | GstSource | RosSource
 Source = Annotated[AnyKind, Field(discriminator="kind")]
-CameraName = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$")]
+CameraName = Annotated[
+    str,
+    Form(
+        "[a-z0-9][a-z0-9_-]{0,31}",
+        "a name of at most 32 characters of a-z, 0-9, _ and -, front or arm_2 for example",
+    ),
+]
 
 
 class ProfileSettings(Section):

@@ -11,9 +11,14 @@ from pydantic_settings import SettingsConfigDict
 
 from common.config import Section, Settings
 from common.socket_path import SocketPath
+from common.text_form import Form
 
 MIB: Final = 1024 * 1024
-Pattern = Annotated[str, Field(max_length=255, pattern=r"^[/*][A-Za-z0-9_/*]*$")]
+Pattern = Annotated[
+    str,
+    Field(max_length=255),
+    Form("[/*][A-Za-z0-9_/*]*", "a topic's full name, or several with *, /odom or /camera/* for example"),
+]
 """A topic's name, in which "*" stands for any number of characters, "/" included."""
 _PRESET_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 _MAX_TOPICS: Final = 256

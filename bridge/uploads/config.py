@@ -6,11 +6,17 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import Field, model_validator
 
 from common.config import Section
+from common.text_form import Form
 from fleet.servers import THIS_MACHINE
 
 _TIME: Final = r"([01][0-9]|2[0-3]):[0-5][0-9]"
-_PLACE: Final = (
-    r"^[a-z0-9]([a-z0-9.-]{0,251}[a-z0-9])?(:[0-9]{1,5})?(/[A-Za-z0-9_-][A-Za-z0-9._-]{0,62}){0,4}$"
+_HOURS: Final = Form(f"{_TIME}-{_TIME}", "two times of the day, 22:00-06:00 for example")
+_INTERFACE: Final = Form(
+    "[A-Za-z0-9_.*-]{1,15}", "a network interface, or several with *, wlan0 or wl* for example"
+)
+_PLACE: Final = Form(
+    r"[a-z0-9]([a-z0-9.-]{0,251}[a-z0-9])?(:[0-9]{1,5})?(/[A-Za-z0-9_-][A-Za-z0-9._-]{0,62}){0,4}",
+    "HOST, HOST:PORT or HOST/BUCKET without https://, store.example:9000 for example",
 )
 _MOST: Final = 16
 
@@ -22,16 +28,12 @@ class UploadSettings(Section):
     """What is copied by itself once it has ended: nothing, incidents, these and pinned recordings, or all."""
     max_bytes_per_s: int = Field(default=0, ge=0)
     """0: no limit. Otherwise at least 64 KiB, so that a part is sent while its URL is valid."""
-    interfaces: tuple[Annotated[str, Field(pattern=r"^[A-Za-z0-9_.*-]{1,15}$")], ...] = Field(
-        default=(), max_length=_MOST
-    )
+    interfaces: tuple[Annotated[str, _INTERFACE], ...] = Field(default=(), max_length=_MOST)
     """Network interfaces through which the store may be reached, "*" for any characters. Empty: all."""
-    hours: tuple[Annotated[str, Field(pattern=f"^{_TIME}-{_TIME}$")], ...] = Field(
-        default=(), max_length=_MOST
-    )
+    hours: tuple[Annotated[str, _HOURS], ...] = Field(default=(), max_length=_MOST)
     """When, "22:00-06:00" for example, by the local time of the robot's computer. Empty: at all times."""
     only_while_charging: bool = False
-    store_hosts: tuple[Annotated[str, Field(pattern=_PLACE)], ...] = Field(default=(), max_length=_MOST)
+    store_hosts: tuple[Annotated[str, _PLACE], ...] = Field(default=(), max_length=_MOST)
     """HOST or HOST:PORT of the fleet's store, with /BUCKET where others have buckets there. Recordings are
     sent nowhere else, whatever URL the hub returns. Empty: nothing can be uploaded."""
     ca: Path | None = None

@@ -6,10 +6,13 @@ from typing import Annotated, Final, Self
 from pydantic import Field, model_validator
 
 from common.config import Section
+from common.text_form import Form
 from gateway.status.faults.platform import PlatformLimits
 from gateway.status.limit import Limit
 
-_FAULT_ID: Final = r"^[a-z0-9_]+(\.[a-z0-9_]+)*$"
+_FAULT_ID: Final = Form(
+    r"[a-z0-9_]+(\.[a-z0-9_]+)*", "a fault's id, or its beginning up to a dot, odometry.stale for example"
+)
 
 
 class _LimitSettings(Section):
@@ -51,7 +54,7 @@ class FaultSettings(Section):
     """How long a condition must be absent before its fault is cleared."""
     keep_cleared_ms: int = Field(default=60_000, ge=0, le=86_400_000)
     """How long a cleared fault stays in the status."""
-    ignored_by_health: tuple[Annotated[str, Field(pattern=_FAULT_ID)], ...] = ("preview", "cloud")
+    ignored_by_health: tuple[Annotated[str, _FAULT_ID], ...] = ("preview", "cloud")
     """Errors that don't degrade the robot's health: fault ids, or their beginnings up to a dot."""
     temperature_c: UpperLimit = UpperLimit(raise_at=85, clear_at=80)
     memory_percent: UpperLimit = UpperLimit(raise_at=92, clear_at=88)

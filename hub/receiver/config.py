@@ -9,9 +9,11 @@ from pydantic_settings import SettingsConfigDict
 from common.config import Section, Settings
 from common.metrics_settings import MetricsSettings, check_metrics
 from common.socket_path import SocketPath
+from common.text_form import Form
+from fleet.names import NAME_EXPECTED, ROBOT_NAME
 from fleet.servers import exposed_server
 
-_Name = Annotated[str, Field(pattern=r"^[a-z0-9]([a-z0-9-]{0,61}[a-z0-9])?$")]
+_Name = Annotated[str, Form(ROBOT_NAME.pattern, NAME_EXPECTED)]
 
 
 class HubSettings(Section):

@@ -7,14 +7,15 @@ from pathlib import Path
 from typing import Any, Final, Literal, get_args
 
 import pytest
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, ValidationError
 from pydantic_settings import SettingsConfigDict
 
 from common.config import Section, Settings, as_yaml, json_schema, load
+from common.config_problems import expected, models_in
 from common.errors import ExitCode, UserError
 from gateway.config import GatewaySettings
 from preview.config import PreviewSettings
-from tests.support.program_settings import PROGRAMS, refusal_of
+from tests.support.program_settings import PROGRAMS, file_with, refusal_of
 
 
 class _Item(Section):
@@ -112,6 +113,8 @@ def test_a_variable_that_is_no_json_is_one_line(monkeypatch: pytest.MonkeyPatch,
     assert str(raised.value).endswith('=["a", "b"] for example')
 
 
+NO_FORM: Final = "\u20ac of no form"
+"""Has no form that any setting requires."""
 WRONG: Final[tuple[Any, ...]] = (
     None,
     "",
@@ -129,6 +132,12 @@ WRONG: Final[tuple[Any, ...]] = (
     {},
     {"a": 1},
     "x" * 5000,
+    NO_FORM,
+)
+
+
+LIBRARY: Final = re.compile(
+    "[Ii]nput should|[Vv]alue error|valid (dict|tuple|string|number|integer)|another value"
 )
 
 
@@ -140,7 +149,7 @@ def keys_of(model: type[BaseModel]) -> Iterator[tuple[str, ...]]:
             yield from ((name, *inner) for inner in keys_of(annotation))
 
 
-@pytest.mark.parametrize("settings_type", [GatewaySettings, PreviewSettings])
+@pytest.mark.parametrize("settings_type", PROGRAMS)
 def test_no_mistake_is_explained_in_the_librarys_words(settings_type: type[Settings], tmp_path: Path) -> None:
     """Whatever is written in place of any value."""
     file = tmp_path / "x.yaml"
@@ -150,16 +159,55 @@ def test_no_mistake_is_explained_in_the_librarys_words(settings_type: type[Setti
             values: Any = wrong
             for key in reversed(keys):
                 values = {key: values}
-            file.write_text(json.dumps(values), encoding="utf-8")
             try:
-                load(settings_type, file)
+                load(settings_type, file_with(settings_type, values, file))
             except UserError as error:
                 sentences.append(error.what)
-    assert len(sentences) > 200
-    library = re.compile(
-        "[Ii]nput should|[Vv]alue error|valid (dict|tuple|string|number|integer)|another value"
-    )
-    assert [each for each in sentences if library.search(each)] == []
+    assert len(sentences) > (200 if settings_type in (GatewaySettings, PreviewSettings) else 20)
+    assert [each for each in sentences if LIBRARY.search(each)] == []
+
+
+def with_a_form(schema: Mapping[str, Any], text: Any) -> Iterator[Any]:
+    """Values of a key by its JSON schema, with the text in each place that requires a form of its texts.
+
+    Sections are left out: they have schemas of their own.
+    """
+    if "pattern" in schema:
+        yield text
+    for branch in schema.get("anyOf", ()):
+        yield from with_a_form(branch, text)
+    if "items" in schema:
+        yield from ([inner] for inner in with_a_form(schema["items"], text))
+    if "patternProperties" in schema:
+        yield {text: {}}
+    if isinstance(values := schema.get("additionalProperties"), dict):
+        yield from ({"a": inner} for inner in with_a_form(values, text))
+
+
+def sections_of(model: type[BaseModel]) -> Iterator[type[BaseModel]]:
+    """A section and those in it."""
+    yield model
+    for field in model.model_fields.values():
+        for inner in models_in(field.annotation):
+            yield from sections_of(inner)
+
+
+def test_a_text_of_another_form_is_explained_by_an_example() -> None:
+    """In all programs: the models say which keys require a form."""
+    explained = {}
+    for section in {each for program in PROGRAMS for each in sections_of(program)}:
+        for key, schema in section.model_json_schema()["properties"].items():
+            for value in with_a_form(schema, NO_FORM):
+                with pytest.raises(ValidationError) as raised:
+                    section.model_validate({key: value})
+                (problem,) = (each for each in raised.value.errors() if each["input"] == NO_FORM)
+                explained[f"{section.__name__}.{key}"] = expected(problem)
+    assert {"PreviewSettings.cameras", "HubSettings.servers", "MuxOutput.topic"} <= explained.keys()
+    assert {
+        key: says
+        for key, says in explained.items()
+        if LIBRARY.search(says) or not re.search("for example|such as", says)
+    } == {}
 
 
 def leaves_of(model: type[BaseModel]) -> Iterator[tuple[tuple[str, ...], Any]]:
