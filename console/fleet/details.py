@@ -40,7 +40,7 @@ def _of_state(state: RobotState, look: Look) -> Iterator[Row]:
     yield look.state("health", state.health.value, HEALTH_STYLES[state.health], state.summary)
     for fault in state.faults:
         text = fault.message or fault.fault_id
-        yield Row("fault", fault.severity.value, FAULT_STYLES[fault.severity], text)
+        yield look.present("fault", fault.severity.value, FAULT_STYLES[fault.severity], text)
     if state.fault_count > len(state.faults):
         more = plural(state.fault_count - len(state.faults), "fault")
         yield Row("", "more", SeverityStyle.WARNING, f"{more} that the state does not list")

@@ -53,10 +53,14 @@ class Look:
 
     def state(self, label: str, state: str, style: SeverityStyle, text: str) -> Row:
         """Returns the row of a state, which reads "last known" once the status is outdated."""
+        return self.present(label, state.upper(), style, text)
+
+    def present(self, label: str, mark: str, style: SeverityStyle, text: str, age: str = "") -> Row:
+        """Returns the row of what is so now; once the status is outdated it reads that it was."""
         if self.outdated:
-            last = joined(f"last known: {state.upper()}", text)
-            return Row(label, _MARKS[Freshness.STALE], SeverityStyle.WARNING, last)
-        return Row(label, state.upper(), style, text)
+            last = joined(f"last known: {mark}", text)
+            return Row(label, _MARKS[Freshness.STALE], SeverityStyle.WARNING, last, age)
+        return Row(label, mark, style, text, age)
 
     def measured(self, label: str, sample: results.Sample, text: str, found: Judgement = GOOD) -> Row:
         """Returns the row of a measured part: marked by its freshness, empty while it is missing.

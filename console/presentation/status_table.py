@@ -79,29 +79,32 @@ def table_rows(view: View) -> list[Row]:
     return [row for rows in TABLE for row in rows(view)]
 
 
-def preview_rows(preview: results.PreviewStatus, look: Look = _NOW) -> Iterator[Row]:
+def preview_rows(
+    preview: results.PreviewStatus, look: Look = _NOW, *, with_fallback: bool = True
+) -> Iterator[Row]:
     """Yields the preview's state, then its error, fallback, figures and address as far as there are any."""
     summary = _preview_summary(preview)
     yield look.state("preview", preview.state.value, PREVIEW_STYLES[preview.state], summary)
     if preview.last_error:
-        yield Row("", "error", SeverityStyle.BAD, preview.last_error)
-    if preview.encoder and preview.encoder.fallback_reason:
+        yield look.present("", "error", SeverityStyle.BAD, preview.last_error)
+    if with_fallback and preview.encoder and preview.encoder.fallback_reason:
         reason = f"preferred {preview.encoder.wanted}, {preview.encoder.fallback_reason}"
-        yield Row("", "fallback", SeverityStyle.WARNING, reason)
+        yield look.present("", "fallback", SeverityStyle.WARNING, reason)
     if preview.bitrate_reason:
-        yield Row("", "bit rate", SeverityStyle.WARNING, preview.bitrate_reason)
+        yield look.present("", "bit rate", SeverityStyle.WARNING, preview.bitrate_reason)
     if len(preview.cameras) > 1:
-        yield from _cameras(preview)
+        yield from _cameras(preview, look)
     if preview.measured.available:
         text = video_text(preview.measured, False, preview.target_bitrate_kbps)
         yield look.measured("stream", preview.measured, text, of_video(preview.measured))
     if preview.endpoint and preview.state is PreviewState.RUNNING:
         encryption = "encrypted" if preview.endpoint.encrypted else ""
         latency = f"latency {preview.endpoint.latency_ms} ms"
-        yield Row("", "watch", SeverityStyle.QUIET, joined(preview.endpoint.uri, latency, encryption))
+        address = joined(preview.endpoint.uri, latency, encryption)
+        yield look.present("", "watch", SeverityStyle.QUIET, address)
 
 
-def _cameras(preview: results.PreviewStatus) -> Iterator[Row]:
+def _cameras(preview: results.PreviewStatus, look: Look) -> Iterator[Row]:
     """Yields the cameras: those that work in one row, each of the others in a row of its own."""
     working = [camera for camera in preview.cameras if camera.state is not CameraState.FAILED]
     shown = (
@@ -109,12 +112,12 @@ def _cameras(preview: results.PreviewStatus) -> Iterator[Row]:
         for camera in working
     )
     if working:
-        yield Row("", "cameras", SeverityStyle.QUIET, joined(*shown))
+        yield look.present("", "cameras", SeverityStyle.QUIET, joined(*shown))
     for camera in preview.cameras:
         if camera.state is CameraState.FAILED:
             wanted = "wanted; " if camera.name == preview.wanted_camera else ""
             style = SeverityStyle.WARNING if wanted else SeverityStyle.QUIET
-            yield Row("", "camera", style, f"{camera.name}: {wanted}{camera.error}")
+            yield look.present("", "camera", style, f"{camera.name}: {wanted}{camera.error}")
 
 
 def health_summary(status: results.SystemStatus) -> str:
@@ -139,9 +142,8 @@ def _faults(view: View) -> Iterator[Row]:
     for fault in view.status.faults:
         if fault.active:
             text = f"{fault.message} -> {fault.remedy}" if fault.remedy else fault.message
-            yield Row(
-                "fault", fault.severity.value, FAULT_STYLES[fault.severity], text, view.age(fault.age_ms)
-            )
+            style, age = FAULT_STYLES[fault.severity], view.age(fault.age_ms)
+            yield view.present("fault", fault.severity.value, style, text, age)
         else:
             cleared_age = view.age(fault.cleared_age_ms)
             yield Row("fault", "cleared", SeverityStyle.QUIET, fault.message, cleared_age)
@@ -237,8 +239,7 @@ def _gateway(view: View) -> Iterator[Row]:
 def _preview(view: View) -> Iterator[Row]:
     # One warning is enough: the fault above says the same.
     reported = any(fault.active and fault.id == "preview.fallback" for fault in view.status.faults)
-    rows = preview_rows(view.status.preview, view)
-    return (row for row in rows if not (reported and row.mark == "fallback"))
+    return preview_rows(view.status.preview, view, with_fallback=not reported)
 
 
 def _teleop(view: View) -> Iterator[Row]:

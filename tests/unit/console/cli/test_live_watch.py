@@ -3,6 +3,7 @@
 import io
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Final
 
 import pytest
 from rich.console import Console
@@ -24,7 +25,7 @@ from console.client import (
 )
 from console.client.mapping.methods import GET_SYSTEM_STATUS
 from console.presentation.severity_style import SeverityStyle
-from omniseer.gateway.v1 import states_pb2
+from omniseer.gateway.v1 import fault_pb2, preview_pb2, states_pb2
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus
 from tests.support.clock import Clock
 from tests.support.gateway_double import healthy_status
@@ -167,10 +168,28 @@ def test_the_body_is_cut(height: int, middle: int) -> None:
         assert f"{11 - middle} more lines" in lines[-3]
 
 
-def drawn(error: GatewayError | None) -> str:
-    """The lines of the view 5.6 s after the last status."""
+def _trouble(message: SystemStatus) -> None:
+    preview = message.preview
+    preview.last_error, preview.bitrate_reason = "the camera was busy", "a narrow link"
+    preview.encoder.wanted, preview.encoder.fallback_reason = "rkmpp", "the driver hangs"
+    preview.endpoint.latency_ms = 125
+    preview.wanted_camera = "rear"
+    preview.cameras.add(name="front", state=preview_pb2.CAMERA_STATE_LIVE)
+    preview.cameras.add(name="rear", state=preview_pb2.CAMERA_STATE_FAILED, error="is not plugged in")
+    message.faults.add(
+        id="odometry.stale",
+        severity=fault_pb2.FAULT_SEVERITY_ERROR,
+        message="odometry stopped coming",
+        active=True,
+    )
+
+
+def drawn(error: GatewayError | None, *, troubled: bool = False) -> str:
+    """The lines of the view 5.6 s after the last status, of a robot with cameras and faults if troubled."""
     message = healthy_status()
     message.preview.state = states_pb2.PREVIEW_RUNNING
+    if troubled:
+        _trouble(message)
     status = GET_SYSTEM_STATUS.decode(message.SerializeToString())
     out = Console(file=io.StringIO(), width=160, height=60)
     out.print(live_view(status, "lab:1", error=error, silent_ms=5600))
@@ -192,3 +211,24 @@ def test_during_an_outage_ages_count_on() -> None:
     (motion,) = (line for line in drawn(Unreachable("gone")).splitlines() if line.startswith("motion"))
     assert "STALE" in motion
     assert motion.rstrip().endswith("5.6 s")
+
+
+SHOWN: Final = (
+    "front (live)",
+    "rear: wanted; is not plugged in",
+    "odometry stopped coming",
+    "the camera was busy",
+    "a narrow link",
+    "the driver hangs",
+    "latency 125 ms",
+)
+
+
+def test_during_an_outage_nothing_of_cameras_preview_and_faults_is_present() -> None:
+    """Each row says that it was so, as the rows of values do."""
+    for error, known in ((None, False), (Unreachable("gone"), True)):
+        lines = drawn(error, troubled=True).splitlines()
+        for text in SHOWN:
+            (line,) = (each for each in lines if text in each)
+            assert ("last known:" in line) is known, line
+            assert ("STALE" in line) is known, line
