@@ -14,11 +14,14 @@ from console.presentation.picture_age import PictureAge
 from console.presentation.severity_style import HEALTH_STYLES, SeverityStyle
 from console.presentation.status_table import health_summary
 from console.presentation.value_style import (
+    BATTERY_FAULTS,
     LOSS_PERCENT,
+    NETWORK_FAULTS,
     PICTURE_AGE_MS,
     ROUND_TRIP_MS,
     WIFI_DBM,
     of_battery,
+    with_faults,
     worst,
 )
 
@@ -81,7 +84,7 @@ def battery_item(state: MonitorState, now_s: float) -> BatteryItem:
     charge = battery.charge_percent if battery.available else None
     if not battery.available or battery.present is False:
         return BatteryItem(UNKNOWN, "no battery")
-    found = of_battery(battery)
+    found = with_faults(of_battery(battery), state.snapshot.status.faults, BATTERY_FAULTS)
     word = quantity(charge, "%", 0)
     if _is_stale(battery, state, now_s):
         return BatteryItem(word, "STALE", SeverityStyle.WARNING, charge_percent=charge)
@@ -105,9 +108,8 @@ def link_item(state: MonitorState, link: LinkText, now_s: float, stream: OwnStre
     if stream and stream.loss_percent is not None:
         loss, whose = stream.loss_percent, "of the video here"
     signal = None if _is_stale(network, state, now_s) else network.wifi_signal_dbm
-    found = worst(
-        (ROUND_TRIP_MS.judge(state.link.answer_ms), LOSS_PERCENT.judge(loss), WIFI_DBM.judge(signal))
-    )
+    wifi = with_faults(WIFI_DBM.judge(signal), status.faults, NETWORK_FAULTS)
+    found = worst((ROUND_TRIP_MS.judge(state.link.answer_ms), LOSS_PERCENT.judge(loss), wifi))
     parts = (
         found.word,
         quantity(state.link.answer_ms, "ms", 0),

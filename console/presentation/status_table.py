@@ -4,8 +4,9 @@ A terminal shows the whole of it with full texts; the monitor's side panel shows
 health, faults and preview have places of their own in the window.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any, Final, TypeAlias
 
 from console.client import results
@@ -48,7 +49,12 @@ from console.presentation.severity_style import (
 )
 from console.presentation.status_row import Look, Row, View, unbroken
 from console.presentation.value_style import (
+    BATTERY_FAULTS,
+    COMPUTE_FAULTS,
+    COMPUTER_BATTERY_FAULTS,
     GOOD,
+    NETWORK_FAULTS,
+    ORIENTATION_FAULTS,
     Judgement,
     of_battery,
     of_compute,
@@ -58,6 +64,7 @@ from console.presentation.value_style import (
     of_position,
     of_text,
     of_video,
+    with_faults,
 )
 
 _CAMERA_IN_USE: Final = (CameraState.LIVE, CameraState.STARTING)
@@ -171,18 +178,24 @@ def text_rows(texts: Iterable[results.TextValue], look: Look) -> Iterator[Row]:
         yield replace(row, label=_title(each.title, look), text=row.text.replace("\u00a0", " "))
 
 
-def pose_rows(position: results.Position, orientation: results.Orientation, look: Look) -> Iterator[Row]:
+def pose_rows(
+    position: results.Position,
+    orientation: results.Orientation,
+    look: Look,
+    faults: Iterable[results.Fault] = (),
+) -> Iterator[Row]:
     """Yields where the robot is and how it stands, as far as it reports that."""
     if position.available:
         text = position_text(position, look.compact)
         yield look.measured("position", position, text, of_position(position))
     if orientation.available:
         text = attitude_text(orientation, look.compact)
-        yield look.measured("attitude", orientation, text, of_orientation(orientation))
+        found = with_faults(of_orientation(orientation), faults, ORIENTATION_FAULTS)
+        yield look.measured("attitude", orientation, text, found)
 
 
 def _poses(view: View) -> Iterator[Row]:
-    return pose_rows(view.status.position, view.status.orientation, view)
+    return pose_rows(view.status.position, view.status.orientation, view, view.status.faults)
 
 
 def _numbers(view: View) -> Iterator[Row]:
@@ -298,6 +311,7 @@ def _measured(
     sample: Callable[[results.SystemStatus], Any],
     text: Callable[[Any, bool], str],
     judge: Callable[[Any], Judgement] = lambda _: GOOD,
+    faults: Mapping[str, str] = MappingProxyType({}),
     *,
     optional: bool = False,
 ) -> Rows:
@@ -305,7 +319,8 @@ def _measured(
 
     def rows(view: View) -> Iterator[Row]:
         part = sample(view.status)
-        row = view.measured(label, part, text(part, view.compact), judge(part))
+        found = with_faults(judge(part), view.status.faults, faults)
+        row = view.measured(label, part, text(part, view.compact), found)
         if row.text or not optional:
             yield row
 
@@ -319,18 +334,39 @@ TABLE: Final[tuple[Rows, ...]] = (
     _measured("vision", lambda status: status.vision, vision_text),
     _objects,
     _full(_preview),
-    _measured("battery", lambda status: status.platform.power.lipo_battery, battery_text, of_battery),
+    _measured(
+        "battery",
+        lambda status: status.platform.power.lipo_battery,
+        battery_text,
+        of_battery,
+        BATTERY_FAULTS,
+    ),
     _measured("command", lambda status: status.effective_command, command_text, optional=True),
     _measured("mode", lambda status: status.mission, lambda mission, _: mission.mode or "", optional=True),
-    _measured("computer", lambda status: status.platform.compute, compute_text, of_compute, optional=True),
+    _measured(
+        "computer",
+        lambda status: status.platform.compute,
+        compute_text,
+        of_compute,
+        COMPUTE_FAULTS,
+        optional=True,
+    ),
     _measured(
         "computer battery",
         lambda status: status.platform.power.onboard_battery,
         battery_text,
         of_battery,
+        COMPUTER_BATTERY_FAULTS,
         optional=True,
     ),
-    _measured("network", lambda status: status.platform.network, network_text, of_network, optional=True),
+    _measured(
+        "network",
+        lambda status: status.platform.network,
+        network_text,
+        of_network,
+        NETWORK_FAULTS,
+        optional=True,
+    ),
     _poses,
     _numbers,
     _texts,

@@ -1,7 +1,8 @@
 """How good the values of a part are: a fresh value may still be a bad one.
 
-The limits are the defaults of the gateway's fault rules (docs/configuration.md, `faults`) where it has one,
-so that a value and its fault agree; beyond `bad` an operator should act at once.
+The limits are the defaults of the gateway's fault rules (docs/configuration.md, `faults`) where it has one;
+beyond `bad` an operator should act at once. A robot's own limits may be others: a part is at least as bad as
+its own active fault, so that no tick denies one.
 """
 
 from collections.abc import Iterable, Mapping
@@ -9,8 +10,8 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from console.client import results
-from console.client.results import NumberLevel, RecorderState, TextLevel
-from console.presentation.severity_style import SeverityStyle
+from console.client.results import Fault, NumberLevel, RecorderState, TextLevel
+from console.presentation.severity_style import FAULT_STYLES, SeverityStyle
 
 
 class Judgement(NamedTuple):
@@ -77,6 +78,17 @@ TEXT_LEVELS: Final[Mapping[TextLevel, Judgement]] = {
     TextLevel.ERROR: Judgement(SeverityStyle.BAD, "ERROR"),
 }
 """Total, as above."""
+BATTERY_FAULTS: Final[Mapping[str, str]] = {"battery.low": "LOW", "battery.out_of_range": "UNKNOWN"}
+"""Words for the faults of a part, by their ids; so are the following."""
+COMPUTER_BATTERY_FAULTS: Final[Mapping[str, str]] = {"platform.battery_low": "LOW"}
+COMPUTE_FAULTS: Final[Mapping[str, str]] = {
+    "platform.temperature": "HOT",
+    "platform.throttled": "HOT",
+    "platform.memory": "FULL",
+    "platform.disk": "FULL",
+}
+NETWORK_FAULTS: Final[Mapping[str, str]] = {"platform.wifi": "WEAK"}
+ORIENTATION_FAULTS: Final[Mapping[str, str]] = {"orientation.tilt": "TILTED"}
 SHORT_ROOM_S: Final = 3600
 """For recordings, at the present rate: less counts as short for the recorder, too. It is never worse than a
 warning, because the recorder may go on for ever by deleting the oldest."""
@@ -85,6 +97,22 @@ warning, because the recorder may go on for ever by deleting the oldest."""
 def worst(judgements: Iterable[Judgement]) -> Judgement:
     """Returns the most severe one, the first of equals."""
     return max(judgements, key=lambda one: _ORDER.index(one.style))
+
+
+def with_faults(found: Judgement, faults: Iterable[Fault], words: Mapping[str, str]) -> Judgement:
+    """Returns the judgement of a part, no better than its own active faults.
+
+    Args:
+        found: by its values.
+        faults: of the robot.
+        words: for those of the part, by their ids.
+    """
+    own = (
+        Judgement(FAULT_STYLES[fault.severity], words[fault.id])
+        for fault in faults
+        if fault.active and fault.id in words
+    )
+    return worst((found, *own))
 
 
 def of_battery(battery: results.Battery) -> Judgement:

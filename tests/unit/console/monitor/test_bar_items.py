@@ -73,6 +73,24 @@ def test_the_battery_is_coloured_by_its_charge_and_by_its_age() -> None:
     assert battery_item(with_charge(78), NOW_S + 60).detail == "STALE"
 
 
+def test_battery_and_link_are_no_better_than_the_robots_own_faults() -> None:
+    """Its limits may be stricter than the defaults."""
+
+    def change(made: overlay_pb2.OverlaySnapshot) -> None:
+        made.status.platform.power.lipo_battery.percentage = 25
+        network = made.status.platform.network
+        network.available, network.connected = True, True
+        network.wifi_signal_available, network.wifi_signal_dbm = True, -60
+        for fault_id in ("battery.low", "platform.wifi"):
+            made.status.faults.add(id=fault_id, severity=2, active=True)
+
+    state = heard(snapshot(change))
+    low, link = battery_item(state, NOW_S), link_item(state, link_text(state.link, "lab", NOW_S), NOW_S)
+    assert (low.word, low.style) == ("25 %", SeverityStyle.WARNING)
+    assert low.detail.startswith("LOW")
+    assert (link.style, link.detail.startswith("WEAK")) == (SeverityStyle.WARNING, True)
+
+
 def test_a_robot_without_a_battery_says_so() -> None:
     def change(made: overlay_pb2.OverlaySnapshot) -> None:
         made.status.platform.power.lipo_battery.available = False

@@ -1,13 +1,25 @@
 """A fresh value may be a bad one: colours by value."""
 
 from collections.abc import Callable
+from typing import Final
 
 import pytest
 
 from console.presentation.severity_style import SeverityStyle
 from console.presentation.status_row import Row, View
 from console.presentation.status_table import table_rows
-from console.presentation.value_style import CHARGE_PERCENT, WIFI_DBM, Judgement
+from console.presentation.value_style import (
+    BATTERY_FAULTS,
+    CHARGE_PERCENT,
+    COMPUTE_FAULTS,
+    COMPUTER_BATTERY_FAULTS,
+    NETWORK_FAULTS,
+    ORIENTATION_FAULTS,
+    WIFI_DBM,
+    Judgement,
+)
+from gateway.status.faults.known import known_faults
+from gateway.status.sources import BATTERY, ORIENTATION
 from omniseer.gateway.v1 import system_status_pb2
 from tests.support.snapshots import snapshot
 
@@ -94,3 +106,56 @@ def test_lost_packets_are_not_green() -> None:
         measured.available, measured.fps, measured.worst_loss_percent = True, 30, 3.0
 
     assert row("Video", change).mark == "LOSSY"
+
+
+def with_fault(fault_id: str, *, active: bool = True, severity: int = 2) -> Change:
+    """A robot whose values are good, by its own limits a fault."""
+
+    def change(status: system_status_pb2.SystemStatus) -> None:
+        charge(60)(status)
+        status.platform.power.onboard_battery.CopyFrom(status.platform.power.lipo_battery)
+        compute, network = status.platform.compute, status.platform.network
+        compute.available, compute.cpu_percent = True, 20
+        network.available, network.connected = True, True
+        status.orientation.available = True
+        angles = status.orientation
+        angles.roll_deg, angles.pitch_deg, angles.yaw_deg = 20, 0, 0
+        status.faults.add(id=fault_id, severity=severity, active=active)
+
+    return change
+
+
+PARTS: Final = {
+    "Battery": BATTERY_FAULTS,
+    "Computer battery": COMPUTER_BATTERY_FAULTS,
+    "Computer": COMPUTE_FAULTS,
+    "Network": NETWORK_FAULTS,
+    "Attitude": ORIENTATION_FAULTS,
+}
+
+
+@pytest.mark.parametrize(
+    ("label", "fault_id", "word"),
+    [(label, *own) for label, faults in PARTS.items() for own in faults.items()],
+)
+def test_no_tick_stands_beside_a_part_with_a_fault_by_the_robots_own_limits(
+    label: str, fault_id: str, word: str
+) -> None:
+    found = row(label, with_fault(fault_id))
+    assert (found.style, found.mark) == (WARNING, word)
+    assert row(label, with_fault(fault_id, severity=3)).style is BAD
+    assert row(label, with_fault(fault_id, active=False)).style is GOOD
+    assert row(label, with_fault("number.motor.above")).style is GOOD, "another part's"
+
+
+def test_a_part_that_is_worse_than_its_fault_stays_so() -> None:
+    def change(status: system_status_pb2.SystemStatus) -> None:
+        charge(5)(status)
+        status.faults.add(id="battery.low", severity=2, active=True)
+
+    assert row("Battery", change).style is BAD
+
+
+def test_the_faults_of_parts_are_those_of_a_gateway() -> None:
+    known = set(known_faults([BATTERY, ORIENTATION]))
+    assert {fault_id for faults in PARTS.values() for fault_id in faults} <= known
