@@ -2,7 +2,9 @@
 
 The preview connects (SOCK_SEQPACKET), and names a topic in its first packet, a JSON object: `{"watch":
 "/front/image_raw"}`. From then on each packet READY permits one frame, so that neither side ever has more
-than one on the way. `{"status": true}` instead asks for the tap's state: the one packet that follows.
+than one on the way. `{"status": true}` instead asks for the tap's state: the one packet that follows; with
+`"examine": "/front/image_raw"` beside it that is a problem, empty if the topic is published as images. A tap
+that is older sends its state.
 
 A packet of the tap is a header of 48 bytes, little endian, and for some kinds a text:
 
@@ -18,7 +20,7 @@ import re
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import Enum, IntEnum
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -71,6 +73,15 @@ class Kind(IntEnum):
     """Text for people: why no frames come, or not all; empty when that is over."""
     STATUS = 2
     """JSON object: the state of the tap."""
+
+
+class Asked(Enum):
+    """What the first packet of a connection asks for."""
+
+    FRAMES = "frames"
+    STATE = "state"
+    PROBLEM = "problem"
+    """Why no frames of a topic can come."""
 
 
 class MalformedPacketError(Exception):
@@ -188,19 +199,27 @@ def encode_watch(topic: str) -> bytes:
 STATUS_REQUEST: Final = json.dumps({"status": True}).encode()
 
 
-def decode_request(packet: bytes) -> str | None:
-    """Returns the topic that the first packet of a connection names; None: it asks for the state.
+def encode_examine(topic: str) -> bytes:
+    """Returns the only packet of a connection that asks for a topic's problem."""
+    return json.dumps({"status": True, "examine": topic}).encode()
+
+
+def decode_request(packet: bytes) -> tuple[Asked, str]:
+    """Returns what the first packet of a connection asks for, and of which topic; empty with STATE.
 
     Raises:
         MalformedPacketError: it is no request.
     """
     request = decode_object(packet)
+    asked, key = Asked.FRAMES, "watch"
     if request.get("status") is True:
-        return None
-    topic = request.get("watch")
+        if "examine" not in request:
+            return Asked.STATE, ""
+        asked, key = Asked.PROBLEM, "examine"
+    topic = request.get(key)
     if not isinstance(topic, str) or not is_topic(topic):
         raise MalformedPacketError("a request that names no topic")
-    return topic
+    return asked, topic
 
 
 def decode_object(packet: bytes) -> dict[str, Any]:

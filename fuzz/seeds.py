@@ -273,6 +273,7 @@ _SEEDS: Final = {
         camera_tap.encode_text(camera_tap.Kind.PROBLEM, "no camera"),
         camera_tap.encode_watch("/camera/image_raw"),
         camera_tap.STATUS_REQUEST,
+        camera_tap.encode_examine("/camera/image_raw"),
     ],
     "image_message": [
         b"\0" + image("bgr8", 4, 2, 12, bytes(24)),

@@ -77,8 +77,8 @@ def camera_taps_packet(data: bytes) -> None:
         assert header.kind is not camera_tap.Kind.FRAME or 0 < header.size <= camera_tap.MAX_FRAME_BYTES
         _must_be_one_line(camera_tap.decode_text(content))
     with suppress(camera_tap.MalformedPacketError):
-        topic = camera_tap.decode_request(data)
-        assert topic is None or camera_tap.is_topic(topic)
+        asked, topic = camera_tap.decode_request(data)
+        assert camera_tap.is_topic(topic) is (asked is not camera_tap.Asked.STATE)
 
 
 def image_message(data: bytes) -> None:

@@ -1,4 +1,4 @@
-"""Finds out which cameras are there, without opening any: device nodes, cards and files.
+"""Finds out which cameras are there, without opening any: device nodes, cards, files and published topics.
 
 So an operator sees that a camera has been unplugged before asking for it, and one that is plugged in again is
 used at once. It looks only while a gateway watches, and not at cameras that are in use. Looking may block, at
@@ -50,7 +50,7 @@ def problems(settings: PreviewSettings, cameras: Iterable[str]) -> dict[str, str
     found = {}
     for camera in cameras:
         try:
-            sources.plan_camera(settings, camera)
+            sources.examine_camera(settings, camera)
         except UserError as error:
             found[camera] = str(error)
         else:

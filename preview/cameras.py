@@ -36,7 +36,7 @@ class CameraState(Enum):
     LIVE = "live"
     """Its frames are the stream's."""
     FAILED = "failed"
-    """It is missing, or failed when it was last used."""
+    """It is missing, its topic is not published, or it failed when it was last used."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ frame waits for another; a queue of one message holds the newest.
 
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any, Final
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -25,6 +25,8 @@ from common.ros_node import TypeMissingError, message_class, subscribe_raw
 from tap.image import READERS
 
 EXAMINE_EVERY_S: Final = 0.5
+DISCOVERY_S: Final = 3.0
+"""After its start a node knows of no publisher yet."""
 _NS_PER_S: Final = 1_000_000_000
 
 
@@ -41,6 +43,22 @@ class Graph:
     def __init__(self, node: Any) -> None:
         self.node = node
         self.lock = threading.Lock()
+        self._made_s = time.monotonic()
+
+    def problem_of(self, topic: str) -> str:
+        """Returns why no messages of a topic can be shown, for people; empty if nothing is known to be wrong.
+
+        Nothing is subscribed for it.
+        """
+        try:
+            with self.lock:
+                endpoints = self.node.get_publishers_info_by_topic(topic)
+        except Exception as error:  # noqa: BLE001  # a peer's name that is not UTF-8, a middleware's error
+            return _can_not_be_examined(topic, error)
+        types = {each.topic_type for each in endpoints}
+        if types & READERS.keys() or (not types and time.monotonic() - self._made_s < DISCOVERY_S):
+            return ""
+        return _publishers_problem(topic, types)
 
 
 class Camera:
@@ -77,7 +95,7 @@ class Camera:
             self.problem = str(error)
         except Exception as error:  # noqa: BLE001  # a peer's name that is not UTF-8, a middleware's error
             if self._subscription is None:
-                self.problem = f"the publishers of {self._topic} can't be examined: {error}"
+                self.problem = _can_not_be_examined(self._topic, error)
 
     def wait(self, timeout_s: float) -> bool:
         """Waits for a message; False if none came in time, or there is no subscription."""
@@ -113,11 +131,7 @@ class Camera:
             (each for each in (self.type_name, *READERS) if each in types and each in READERS), ""
         )
         if not type_name:
-            self.problem = (
-                f"{self._topic} is published as {', '.join(sorted(types))}, not as {' or '.join(READERS)}"
-                if types
-                else f"nothing publishes {self._topic}"
-            )
+            self.problem = _publishers_problem(self._topic, types)
             return
         reliable = all(
             each.qos_profile.reliability == ReliabilityPolicy.RELIABLE
@@ -142,3 +156,14 @@ class Camera:
         )
         self._subscription = subscribe_raw(self._graph.node, message_type, self._topic, profile)
         self._message_type, self.type_name, self._reliable = message_type, type_name, reliable
+
+
+def _publishers_problem(topic: str, types: Collection[str]) -> str:
+    """Returns why a topic with none of the image types can't be shown."""
+    if not types:
+        return f"nothing publishes {topic}"
+    return f"{topic} is published as {', '.join(sorted(types))}, not as {' or '.join(READERS)}"
+
+
+def _can_not_be_examined(topic: str, error: Exception) -> str:
+    return f"the publishers of {topic} can't be examined: {error}"

@@ -22,6 +22,7 @@ from typing import Final
 from common.camera_tap import (
     MAX_REQUEST_BYTES,
     READY,
+    Asked,
     Kind,
     MalformedPacketError,
     decode_request,
@@ -116,9 +117,12 @@ class Connection:
         request = self._receive(REQUEST_WITHIN_S)
         if not request:
             return
-        topic = decode_request(request)
-        if topic is None:
+        asked, topic = decode_request(request)
+        if asked is Asked.STATE:
             self._socket.send(encode_text(Kind.STATUS, self._state()))
+            return
+        if asked is Asked.PROBLEM:
+            self._socket.send(encode_text(Kind.PROBLEM, self._graph.problem_of(topic)))
             return
         self.topic = topic
         self._totals.connected(topic)

@@ -87,6 +87,26 @@ def plan_camera(settings: PreviewSettings, camera: str) -> SourcePlan:
     return replace(planned, label=label, silence_s=source.silence_s)
 
 
+def examine_camera(settings: PreviewSettings, camera: str) -> None:
+    """Finds out whether a camera can be used, without opening it.
+
+    More than a plan does: a start waits some time for a topic that is about to be published.
+
+    Args:
+        settings: of the service.
+        camera: its name.
+
+    Raises:
+        UserError: the camera can't be used, as far as is known.
+    """
+    plan_camera(settings, camera)
+    source = settings.named_sources[camera]
+    if isinstance(source, RosSource):
+        problem = tap_client.topic_problem(settings.camera_tap.socket, source.topic)
+        if problem:
+            raise UserError(f"camera {camera}: {problem}" if settings.cameras else problem, _REMEDY_TOPIC)
+
+
 def _plan(settings: PreviewSettings, camera: str, key: str, source: AnyKind) -> SourcePlan:
     fastest_fps = max(target.fps for target in settings.profiles.targets.values())
     match source:

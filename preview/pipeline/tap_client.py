@@ -14,6 +14,7 @@ import os
 import socket
 from array import array
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -27,10 +28,13 @@ from common.camera_tap import (
     MalformedPacketError,
     decode,
     decode_text,
+    encode_examine,
     encode_watch,
 )
 
 CONNECT_S: Final = 2.0
+_ANSWER_S: Final = 0.5
+"""The tap answers from what it knows; one that does not is busy, and a start finds out."""
 _INT_BYTES: Final = array("i").itemsize
 
 
@@ -158,6 +162,22 @@ def connection_problem(path: Path) -> str:
     except TapError as error:
         return str(error)
     return ""
+
+
+def topic_problem(path: Path, topic: str) -> str:
+    """Returns why a topic can't be shown, for people; empty if it can, or if the tap does not say in time."""
+    try:
+        with closing(_connected(path, _ANSWER_S)) as connection:
+            connection.send(encode_examine(topic))
+            packet = connection.recv(MAX_PACKET_BYTES)
+        header, content = decode(packet) if packet else (None, b"")
+    except TapError as error:
+        return f"the camera tap can't be asked for {topic}: {error}"
+    except MalformedPacketError as error:
+        return f"the camera tap sent {error}"
+    except OSError:  # Among them that nothing has come in time.
+        return ""
+    return decode_text(content) if header and header.kind is Kind.PROBLEM else ""
 
 
 def _connected(path: Path, timeout_s: float) -> socket.socket:

@@ -15,6 +15,7 @@ from urllib.request import urlopen
 import pytest
 from rclpy.duration import Duration
 from sensor_msgs.msg import Image
+from std_msgs.msg import Header as Marker
 
 from common.camera_tap import (
     MAX_PACKET_BYTES,
@@ -25,11 +26,12 @@ from common.camera_tap import (
     decode,
     encode_watch,
 )
-from preview.pipeline.tap_client import TapClient, TapError
+from preview.pipeline.tap_client import TapClient, TapError, topic_problem
 from tap.app import MAX_CONNECTIONS
+from tap.image import READERS
 from tests.support.free import free_tcp_port
 from tests.support.ros_camera import compressed, picture, ros_camera
-from tests.support.running_tap import RunningTap
+from tests.support.running_tap import PATIENCE_S, RunningTap
 from tests.support.talker import talking
 from tests.support.waiting import wait_until
 
@@ -176,6 +178,23 @@ def test_what_is_no_client_is_disconnected(tap: RunningTap, packets: list[bytes]
         wait_until(lambda: ends(client), "disconnected")
     # The thread of the connection closes it first, and ends then.
     tap.wait_for(lambda state: state["wanted"] == [], "nothing is wanted")
+
+
+def test_it_says_whether_a_topic_is_published_as_images(tap: RunningTap) -> None:
+    """Without a subscription."""
+    with talking() as talker:
+        talker.publisher("/words", Marker)
+
+        def says(topic: str, problem: str) -> None:
+            wait_until(lambda: topic_problem(tap.socket, topic) == problem, f"{topic}: {problem}", PATIENCE_S)
+
+        says("/nothing", "nothing publishes /nothing")
+        says("/words", f"/words is published as std_msgs/msg/Header, not as {' or '.join(READERS)}")
+        with ros_camera(TOPIC):
+            says(TOPIC, "")
+            assert tap.state()["wanted"] == []
+            assert tap.state()["topics"] == {}
+        says(TOPIC, f"nothing publishes {TOPIC}")
 
 
 def test_a_client_that_says_nothing_is_disconnected_in_time(tap: RunningTap) -> None:

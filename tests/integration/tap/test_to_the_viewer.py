@@ -3,7 +3,7 @@
 import math
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -192,6 +192,22 @@ def test_without_a_publisher_the_fault_says_so_until_there_is_one(tap: RunningTa
             preview.running()
             with Eye(preview.port) as eye:
                 eye.sees("green")
+
+
+def test_a_camera_that_is_not_in_use_says_that_its_topic_is_not_published(
+    tap: RunningTap, tmp_path: Path
+) -> None:
+    """As after a mistake in the topic's name: the tap runs, and no operator has chosen the camera yet."""
+    cameras = {"front": {"kind": "test"}, "arm": ros()}
+
+    def is_so(state: str, error: str) -> Callable[[pb.ActualState], bool]:
+        return lambda actual: camera(actual, "arm")[0] == state and error in camera(actual, "arm")[1]
+
+    with preview_of(tap, tmp_path, cameras=cameras) as preview:
+        preview.wait_for(is_so("FAILED", f"nothing publishes {TOPIC}"), "its state", 30)
+        with ros_camera(TOPIC):
+            preview.wait_for(is_so("READY", ""), "it is there", 30)
+        preview.wait_for(is_so("FAILED", "nothing publishes"), "it is gone", 30)
 
 
 def test_a_topic_of_another_type_is_named(tap: RunningTap, tmp_path: Path) -> None:

@@ -1,5 +1,7 @@
 """Packets between the preview and the camera tap."""
 
+import json
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -8,12 +10,14 @@ from common.camera_tap import (
     HEADER_BYTES,
     MAX_TEXT_BYTES,
     STATUS_REQUEST,
+    Asked,
     Header,
     Kind,
     MalformedPacketError,
     decode,
     decode_request,
     decode_text,
+    encode_examine,
     encode_text,
     encode_watch,
     is_topic,
@@ -77,7 +81,8 @@ def test_a_problem_is_one_printable_line_of_bounded_length() -> None:
 @pytest.mark.parametrize("name", ["/image", "/front/image_raw", "/a/_b/c1"])
 def test_a_full_name_is_a_topic(name: str) -> None:
     assert is_topic(name)
-    assert decode_request(encode_watch(name)) == name
+    assert decode_request(encode_watch(name)) == (Asked.FRAMES, name)
+    assert decode_request(encode_examine(name)) == (Asked.PROBLEM, name)
 
 
 @pytest.mark.parametrize(
@@ -85,9 +90,15 @@ def test_a_full_name_is_a_topic(name: str) -> None:
 )
 def test_anything_else_is_none(name: str) -> None:
     assert not is_topic(name)
-    with pytest.raises(MalformedPacketError):
-        decode_request(encode_watch(name))
+    for encode in (encode_watch, encode_examine):
+        with pytest.raises(MalformedPacketError):
+            decode_request(encode(name))
 
 
 def test_the_state_is_asked_for_by_name() -> None:
-    assert decode_request(STATUS_REQUEST) is None
+    assert decode_request(STATUS_REQUEST) == (Asked.STATE, "")
+
+
+def test_an_older_tap_takes_the_question_for_a_topic_for_one_for_its_state() -> None:
+    """It disconnects, with a warning in its log, whoever sends what it does not know."""
+    assert json.loads(encode_examine("/image")).items() >= json.loads(STATUS_REQUEST).items()

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from common.errors import UserError
+from preview.camera_watch import problems
 from preview.config import (
     CameraTapSettings,
     FileSource,
@@ -20,7 +21,7 @@ from preview.config import (
     TestSource,
     V4l2Source,
 )
-from preview.pipeline import sources
+from preview.pipeline import sources, tap_client
 from preview.pipeline.sources import SourcePlan
 
 
@@ -148,3 +149,28 @@ def test_a_topic_goes_by_way_of_the_camera_tap_which_must_be_there(tmp_path: Pat
         assert sources.plan_camera(settings, "top").properties["tap"]["fps"] == "60"
     with pytest.raises(UserError, match="not running"):
         sources.plan_camera(settings, "arm")
+
+
+@pytest.mark.parametrize("problem", ["nothing publishes /arm/image_rwa", ""])
+def test_a_topic_that_nothing_publishes_is_seen_before_it_is_started(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, problem: str
+) -> None:
+    path, asked = tmp_path / "tap.sock", list[tuple[Path, str]]()
+
+    def topic_problem(*question: Any) -> str:
+        asked.append(question)
+        return problem
+
+    monkeypatch.setattr(tap_client, "topic_problem", topic_problem)
+    settings = PreviewSettings(
+        cameras={"arm": RosSource(topic="/arm/image_rwa"), "front": TestSource()},
+        camera_tap=CameraTapSettings(socket=path),
+    )
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
+        listener.bind(str(path))
+        listener.listen()
+        found = problems(settings, ("arm", "front"))
+    assert asked == [(path, "/arm/image_rwa")]
+    assert found["front"] == ""
+    assert found["arm"].startswith(f"camera arm: {problem}. 'robot-tap doctor' lists" if problem else "")
+    assert bool(found["arm"]) is bool(problem)

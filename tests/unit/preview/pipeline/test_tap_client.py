@@ -4,13 +4,14 @@ import fcntl
 import os
 import socket
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
-from common.camera_tap import READY, Header, Kind, encode_text, encode_watch
-from preview.pipeline.tap_client import TapClient, TapError, connection_problem
+from common.camera_tap import READY, Header, Kind, encode_examine, encode_text, encode_watch
+from preview.pipeline.tap_client import TapClient, TapError, connection_problem, topic_problem
 
 FRAME = Header(Kind.FRAME, 4, 2, 24, 123, "RGB")
 PATIENCE_S = 5.0
@@ -139,3 +140,35 @@ def test_where_no_tap_serves_it_says_so(tmp_path: Path) -> None:
     assert connection_problem(path) == "it is not running", "a socket that was left behind"
     with pytest.raises(TapError, match="not running"):
         TapClient(path, "/image")
+
+
+@pytest.mark.parametrize(
+    ("answer", "says"),
+    [
+        (encode_text(Kind.PROBLEM, "nothing publishes /image"), "nothing publishes /image"),
+        (encode_text(Kind.PROBLEM, ""), ""),
+        (encode_text(Kind.STATUS, "{}" + " " * 20_000), ""),
+        (b"", ""),
+        (b"nonsense", "the camera tap sent a packet of 8 bytes"),
+        (None, ""),
+    ],
+    ids=["problem", "none", "older tap", "closed", "nonsense", "silence"],
+)
+def test_a_tap_is_asked_whether_a_topic_can_be_shown(tmp_path: Path, answer: bytes | None, says: str) -> None:
+    path, requests = tmp_path / "tap", []
+    with listening(path) as listener, ThreadPoolExecutor(1) as pool:
+        listener.settimeout(PATIENCE_S)
+        asked = pool.submit(topic_problem, path, "/image")
+        tap, _ = listener.accept()
+        with tap:
+            requests.append(tap.recv(1000))
+            if answer:
+                tap.send(answer)
+            if answer is None:
+                assert asked.result(PATIENCE_S) == says
+        assert asked.result(PATIENCE_S) == says
+    assert requests == [encode_examine("/image")]
+
+
+def test_a_tap_that_is_gone_is_a_problem_of_its_topics(tmp_path: Path) -> None:
+    assert "it is not running" in topic_problem(tmp_path / "tap", "/image")
