@@ -105,7 +105,8 @@ OLDER: Final = (
     Older(
         ("drive.false_stops*", "drive.command_p99_ms"),
         frozenset({"648d6af8"}),
-        "measured with two lanes, against one where a row compares. Since commit 11d38fb6 a session has three.",
+        "measured with two lanes, against one where a row compares. Since commit 11d38fb6 a session has"
+        " three.",
     ),
     Older(
         ("siege.*",),
