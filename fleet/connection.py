@@ -25,15 +25,27 @@ from typing import Any, Final
 from common.backoff import Backoff
 from common.broadcast import Broadcast
 from common.tasks import cancel
-from fleet import consuming
-from fleet.consuming import Delivery, Start
+from fleet import consuming, direct, names
+from fleet.consuming import Delivery
+from fleet.direct import Start, StoredMessage
 from fleet.errors import HubError, HubReason, RefusedError, UnreachableError, api_error, is_repeat
 from fleet.incoming import OPERATION
 from fleet.replies import NO_RESPONDERS, Message, NotTaken, parsed
 from fleet.serving import Handler, Service, serve_in
 from fleet.session import Session
 
-__all__ = ["Delivery", "Entry", "FleetAddress", "Hub", "Link", "NotTaken", "Published", "Start", "connect"]
+__all__ = [
+    "Delivery",
+    "Entry",
+    "FleetAddress",
+    "Hub",
+    "Link",
+    "NotTaken",
+    "Published",
+    "Start",
+    "StoredMessage",
+    "connect",
+]
 
 FIRST_PAUSE_S: Final = 1.0
 LONGEST_PAUSE_S: Final = 60.0
@@ -102,7 +114,8 @@ class Entry:
         revision: counts up with each change in the bucket.
         unix_s: when the hub took it, by the hub's clock.
         deleted: whether it was deleted.
-        pending: values of the bucket still to come when this one was sent; 0: it is the newest one.
+        pending: values of the bucket still to come when this one was sent; 0: it is the newest one; None: the
+            hub does not say (before 2.11).
     """
 
     key: str
@@ -110,7 +123,7 @@ class Entry:
     revision: int
     unix_s: float
     deleted: bool
-    pending: int
+    pending: int | None
 
 
 class Hub:
@@ -188,26 +201,26 @@ class Hub:
             timeout_s: for each answer of the hub.
 
         Raises:
-            HubError: it can't be read; TOO_MANY: it has more than is read at once (`consuming.present`).
+            HubError: it can't be read; TOO_MANY: it has more than is read at once (`direct.present`).
         """
         found: dict[str, Entry] = {}
-        start = Start.last_per_subject()
-        present = consuming.present(self._open(), f"KV_{bucket}", f"$KV.{bucket}.{keys}", start, timeout_s)
-        async with aclosing(present) as deliveries:
-            async for delivery in deliveries:
-                entry = _entry(bucket, delivery)
+        present = direct.present(self._open(), f"KV_{bucket}", f"$KV.{bucket}.{keys}", timeout_s)
+        async with aclosing(present) as messages:
+            async for message in messages:
+                entry = _entry(bucket, message)
+                # What changes while it is read comes once more.
+                found.pop(entry.key, None)
                 if not entry.deleted:
                     found[entry.key] = entry
         return found
 
     async def watch_bucket(self, bucket: str) -> AsyncGenerator[Entry, None]:
         """Yields the present entries of a bucket and then every change, over all lost connections."""
-        start = Start.last_per_subject()
-        async with aclosing(self.follow(f"KV_{bucket}", f"$KV.{bucket}.>", start)) as deliveries:
-            async for delivery in deliveries:
-                yield _entry(bucket, delivery)
+        async with aclosing(self.follow(f"KV_{bucket}", f"$KV.{bucket}.>", Start.all())) as messages:
+            async for message in messages:
+                yield _entry(bucket, message)
 
-    async def follow(self, stream: str, subjects: str, start: Start) -> AsyncGenerator[Delivery, None]:
+    async def follow(self, stream: str, subjects: str, start: Start) -> AsyncGenerator[StoredMessage, None]:
         """Yields the messages of a stream in order, each once, over all lost connections.
 
         Args:
@@ -220,28 +233,27 @@ class Hub:
         while True:
             await self.connected()
             try:
-                async with aclosing(consuming.follow(self._open(), stream, subjects, place)) as deliveries:
-                    async for delivery in deliveries:
+                following = direct.follow(self._open(), stream, subjects, place, REQUEST_TIMEOUT_S)
+                async with aclosing(following) as messages:
+                    async for message in messages:
                         pause.reset()
-                        place = Start.after(delivery.sequence)
-                        yield delivery
+                        place = Start.after(message.sequence)
+                        yield message
             except HubError:
                 await self._pause(pause)
 
-    async def last(self, stream: str, subjects: str, timeout_s: float = REQUEST_TIMEOUT_S) -> Delivery | None:
+    async def last(
+        self, stream: str, subjects: str, timeout_s: float = REQUEST_TIMEOUT_S
+    ) -> StoredMessage | None:
         """Returns the newest message of a stream with such a subject; None if there is none.
 
         Raises:
             HubError: it can't be read.
         """
-        start = Start.last()
-        async with aclosing(
-            consuming.present(self._open(), stream, subjects, start, timeout_s)
-        ) as deliveries:
-            return await anext(deliveries, None)
+        return await direct.last(self._open(), stream, subjects, timeout_s)
 
     async def count(self, stream: str, subjects: str, timeout_s: float = REQUEST_TIMEOUT_S) -> int:
-        """Returns how many messages of a stream have such subjects.
+        """Returns how many messages of a stream have such subjects; for the administration.
 
         Raises:
             HubError: it can't be read.
@@ -316,7 +328,7 @@ class Hub:
             at_once: requests in hand at any moment.
             of_one: of these, about one robot; None: all of them.
             busy: answer to requests beyond that.
-            of_people: whether they are those of people, who share an account with this program.
+            of_people: whether they are those of people, whose inboxes have no robot's name.
             long: names of requests that take minutes: `at_once` and `of_one` hold for them and for the others
                 each, so that the others are answered meanwhile.
         """
@@ -336,6 +348,20 @@ class Hub:
             HubError: with JetStream's code.
         """
         return await self._open().api(f"$JS.API.{call}", request, timeout_s)
+
+    async def stream_info(self, stream: str, timeout_s: float = REQUEST_TIMEOUT_S) -> dict[str, Any]:
+        """Returns JetStream's StreamInfo of a stream.
+
+        Raises:
+            HubError: with JetStream's code.
+        """
+        try:
+            return await self._open().api(names.info_subject(stream), None, timeout_s)
+        except HubError as error:
+            if error.reason is not HubReason.NO_RESPONDERS:
+                raise
+        # The name is that of people's accounts. Where the streams are, the call has its own.
+        return await self.api(f"STREAM.INFO.{stream}", None, timeout_s)
 
     async def consumer_info(self, subject: str, timeout_s: float = REQUEST_TIMEOUT_S) -> dict[str, Any]:
         """Requests JetStream's ConsumerInfo by a subject that the account has it under.
@@ -457,12 +483,12 @@ def acknowledged(message: Message) -> None:
         raise api_error({"description": "the answer to a message is no acknowledgement"})
 
 
-def _entry(bucket: str, delivery: Delivery) -> Entry:
+def _entry(bucket: str, message: StoredMessage) -> Entry:
     return Entry(
-        key=delivery.subject.removeprefix(f"$KV.{bucket}."),
-        value=delivery.payload,
-        revision=delivery.sequence,
-        unix_s=delivery.unix_s,
-        deleted=delivery.headers.get(OPERATION) in {"DEL", "PURGE"},
-        pending=delivery.pending,
+        key=message.subject.removeprefix(f"$KV.{bucket}."),
+        value=message.payload,
+        revision=message.sequence,
+        unix_s=message.unix_s,
+        deleted=message.headers.get(OPERATION) in {"DEL", "PURGE"},
+        pending=message.pending,
     )

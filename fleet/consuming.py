@@ -1,4 +1,4 @@
-"""Reading streams: pull requests to a consumer, and what comes back, within one session."""
+"""A robot's commands: pull requests to a consumer, and what comes back, within one session."""
 
 import asyncio
 import json
@@ -6,8 +6,8 @@ import secrets
 import time
 from collections.abc import AsyncGenerator, Mapping
 from contextlib import aclosing, asynccontextmanager
-from dataclasses import dataclass, field
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import Final
 
 from common.backoff import Backoff
 from fleet.errors import HubError, HubReason
@@ -21,14 +21,8 @@ _HEARTBEAT_S: Final = 2.0
 """The hub says this often that it still knows the pull request; two missing ones end it."""
 _INACTIVE_S: Final = 60.0
 """The hub forgets a consumer of ours that is not read for this long."""
-_BATCH: Final = 256
-"""Messages requested at once."""
 _MAX_BYTES: Final = 4 * 1024 * 1024
 """Bytes requested at once; more than any single message may have."""
-MOST_PRESENT: Final = 100_000
-"""Messages that are read at once (`present`): ten times the robots that a console shows."""
-MOST_PRESENT_BYTES: Final = 256 * 1024 * 1024
-"""Bytes of their contents: they are all in memory, and a hub could send without end."""
 _TIMEOUT_S: Final = 5.0
 _FIRST_PAUSE_S: Final = 0.05
 _LONGEST_PAUSE_S: Final = 0.5
@@ -39,43 +33,6 @@ _SOON_S: Final = 1.0
 _KNOWN_WITHIN_S: Final = 3.0
 """From a pull request that no node could pass on until the consumer counts as unknown."""
 _NANOSECONDS: Final = 1_000_000_000
-
-
-@dataclass(frozen=True, slots=True)
-class Start:
-    """Where in a stream to begin."""
-
-    config: Mapping[str, Any] = field(default_factory=lambda: {"deliver_policy": "all"})
-
-    @classmethod
-    def all(cls) -> "Start":
-        """With the oldest message."""
-        return cls()
-
-    @classmethod
-    def new(cls) -> "Start":
-        """With the first message after now."""
-        return cls({"deliver_policy": "new"})
-
-    @classmethod
-    def last(cls) -> "Start":
-        """With the newest message."""
-        return cls({"deliver_policy": "last"})
-
-    @classmethod
-    def last_per_subject(cls) -> "Start":
-        """With the newest message of each subject."""
-        return cls({"deliver_policy": "last_per_subject"})
-
-    @classmethod
-    def after(cls, sequence: int) -> "Start":
-        """With the first message after that of this sequence."""
-        return cls({"deliver_policy": "by_start_sequence", "opt_start_seq": sequence + 1})
-
-    @classmethod
-    def at(cls, rfc3339: str) -> "Start":
-        """With the first message that the stream took at or after this time, as "2026-01-31T12:00:00Z"."""
-        return cls({"deliver_policy": "by_start_time", "opt_start_time": rfc3339})
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,91 +91,27 @@ async def pull(session: Session, stream: str, consumer: str, batch: int) -> Asyn
                 backoff.reset()
 
 
-async def follow(
-    session: Session, stream: str, subjects: str, start: Start
-) -> AsyncGenerator[Delivery, None]:
-    """Yields a stream's messages in order, through a consumer that the hub keeps in memory.
-
-    Raises:
-        HubError: the session is lost, or messages are: begin again after the last one.
-    """
-    consumer, _ = await _new_consumer(session, stream, subjects, start, _TIMEOUT_S)
-    try:
-        expected = 1
-        async with aclosing(pull(session, stream, consumer, _BATCH)) as deliveries:
-            async for delivery in deliveries:
-                if delivery.consumer_sequence != expected:
-                    raise HubError(HubReason.INVALID, "messages were lost on their way")
-                expected += 1
-                yield delivery
-    finally:
-        await _forget(session, stream, consumer)
-
-
-async def present(
-    session: Session, stream: str, subjects: str, start: Start, timeout_s: float
-) -> AsyncGenerator[Delivery, None]:
-    """Yields the messages that are in a stream now, and ends.
-
-    Raises:
-        HubError: it can't be read; TOO_MANY: there are more than MOST_PRESENT, or MOST_PRESENT_BYTES.
-    """
-    consumer, pending = await _new_consumer(session, stream, subjects, start, timeout_s)
-    count = size = 0
-    try:
-        if pending > MOST_PRESENT:
-            raise _too_many(f"{stream} has {pending} messages, more than the {MOST_PRESENT} that")
-        async with _Puller.open(session, stream, consumer) as puller:
-            while pending > 0:
-                before = pending
-                async with aclosing(puller.request(min(pending, _BATCH), timeout_s)) as deliveries:
-                    async for delivery in deliveries:
-                        pending = delivery.pending
-                        count, size = count + 1, size + len(delivery.payload)
-                        if count > MOST_PRESENT:
-                            raise _too_many(f"{stream} has more than the {MOST_PRESENT} messages that")
-                        if size > MOST_PRESENT_BYTES:
-                            raise _too_many(f"{stream} has more than the {MOST_PRESENT_BYTES} bytes that")
-                        yield delivery
-                if pending == before:
-                    raise HubError(HubReason.TIMEOUT, f"the hub sends nothing of {stream} in {timeout_s:g} s")
-    finally:
-        await _forget(session, stream, consumer)
-
-
-def _too_many(text: str) -> HubError:
-    return HubError(HubReason.TOO_MANY, f"{text} are read at once")
-
-
 async def count(session: Session, stream: str, subjects: str, timeout_s: float) -> int:
-    """Returns how many messages of a stream have such subjects.
+    """Returns how many messages of a stream have such subjects: what a consumer would deliver.
 
     Raises:
         HubError: it can't be read.
     """
-    consumer, pending = await _new_consumer(session, stream, subjects, Start.all(), timeout_s)
-    await _forget(session, stream, consumer)
-    return pending
-
-
-async def _new_consumer(
-    session: Session, stream: str, subjects: str, start: Start, timeout_s: float
-) -> tuple[str, int]:
-    """Makes a consumer that the hub forgets by itself; returns its name and how much it has to deliver."""
     name = secrets.token_hex(8)
     config = {
         "name": name,
         "ack_policy": "none",
+        "deliver_policy": "all",
         "filter_subject": subjects,
         "inactive_threshold": int(_INACTIVE_S * _NANOSECONDS),
         "mem_storage": True,
         "num_replicas": 1,
-        **start.config,
     }
     call = f"$JS.API.CONSUMER.CREATE.{stream}.{name}.{subjects}"
     info = await session.api(call, {"stream_name": stream, "config": config}, timeout_s)
+    await _forget(session, stream, name)
     pending = info.get("num_pending", 0)
-    return name, pending if isinstance(pending, int) else 0
+    return pending if isinstance(pending, int) else 0
 
 
 async def _forget(session: Session, stream: str, consumer: str) -> None:

@@ -10,6 +10,7 @@ connection each time, and keeps every header, of which a message may have half a
 | such a reply subject | none; counted |
 | headers larger than 4 KiB, of another version, or with a status that is no number | no headers; counted |
 | other headers than those below | they are not kept |
+| headers of a sender that look like the hub's | the hub's own are behind them, and count (`read_place`) |
 | a status in the name of the hub, of another client | see `consuming.py`: only answers have one |
 """
 
@@ -21,6 +22,14 @@ STATUS: Final = "Status"
 DESCRIPTION: Final = "Description"
 OPERATION: Final = "KV-Operation"
 """Of a change in a bucket (ADR-8)."""
+STORED_AS: Final = "Nats-Subject"
+"""Of a stored message that a direct get answers with (ADR-31), as are the next ones: its subject."""
+SEQUENCE: Final = "Nats-Sequence"
+TAKEN: Final = "Nats-Time-Stamp"
+PENDING: Final = "Nats-Num-Pending"
+"""Messages still to come; servers before 2.11 don't say it."""
+PREVIOUS: Final = "Nats-Last-Sequence"
+"""Sequence of the message before, in the same answer."""
 LARGEST_HEADERS: Final = 4096
 """Bytes; those of JetStream have some hundred."""
 LONGEST_SUBJECT: Final = 1024
@@ -29,6 +38,8 @@ _LONGEST_VALUE: Final = 256
 _REPLACED: Final = "\N{REPLACEMENT CHARACTER}"
 _VERSION: Final = b"NATS/1.0"
 _STATUS: Final = re.compile(rb"[0-9]{3}")
+_PLACE: Final = {each.encode(): each for each in (SEQUENCE, TAKEN, PENDING, PREVIOUS)}
+_FIRST_OF_PLACE: Final = f"\r\n{STORED_AS}:".encode()
 
 
 def read_headers(block: bytes) -> dict[str, str] | None:
@@ -48,6 +59,23 @@ def read_headers(block: bytes) -> dict[str, str] | None:
         name, colon, value = line.partition(b":")
         if colon and name == OPERATION.encode():
             found[OPERATION] = _value(value)
+    return found
+
+
+def read_place(block: bytes) -> dict[str, str]:
+    """Returns what the hub says of a stored message: its subject, and its place in the stream.
+
+    The hub adds it behind the headers of the sender, which may be of any size and have the same names.
+    """
+    begin = block.rfind(_FIRST_OF_PLACE)
+    if begin < 0:
+        return {}
+    subject, *lines = block[begin + len(_FIRST_OF_PLACE) :].split(b"\r\n")
+    found = {STORED_AS: read_subject(subject.strip())[0]}
+    for line in lines:
+        name, _, value = line.partition(b":")
+        if name in _PLACE:
+            found[_PLACE[name]] = _value(value)
     return found
 
 

@@ -64,6 +64,11 @@ def time_subject(robot: str) -> str:
     return f"fleet.{robot}.time"
 
 
+def info_subject(stream: str) -> str:
+    """Returns the subject of people's request for how full a stream is: StreamInfo."""
+    return f"fleet.info.{stream}"
+
+
 def upload_subject(robot: str, request: str) -> str:
     """Returns the subject of a request about an upload: "begin_file", for example."""
     return f"fleet.{robot}.up.{request}"

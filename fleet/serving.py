@@ -91,5 +91,5 @@ async def serve_in(session: Session, service: Service, calls: set[asyncio.Task[N
 def _inboxes(service: Service, robot: str) -> tuple[str, ...]:
     """Returns where the answer to a request may go."""
     if service.of_people:
-        return (f"{names.INBOXES}.",)
+        return (f"{names.INBOXES}.", _ROUTED)
     return (f"{names.inbox_prefix(robot)}.", _ROUTED)

@@ -25,7 +25,7 @@ from nats.protocol.parser import AWAITING_CONTROL_LINE, PERMISSIONS_ERR, Parser
 from common.deadline import within
 from fleet.errors import HubError, HubReason, RefusedError, UnreachableError
 from fleet.identity import Credentials
-from fleet.incoming import read_headers, read_reply, read_subject
+from fleet.incoming import read_headers, read_place, read_reply, read_subject
 from fleet.names import LARGEST_MESSAGE
 from fleet.replies import MAX_WAITING, MAX_WAITING_MESSAGES, NO_RESPONDERS, Message, NotTaken, Waiter, parsed
 
@@ -137,7 +137,8 @@ class _Client(Client):
         found = read_headers(headers)
         if found is None:
             self.not_taken.unreadable += 1
-        return found
+        # Also where the sender's own are unreadable: without its place, a stored message could not be passed.
+        return (found or {}) | read_place(headers)
 
     def _build_message(
         self, sid: int, subject: bytes, reply: bytes, data: bytes, headers: dict[str, str] | None

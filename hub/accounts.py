@@ -1,4 +1,16 @@
-"""The hub's operator and its three accounts: their keys, and the tokens that servers believe.
+"""The hub's operator and its accounts: their keys, and the tokens that servers believe.
+
+| account | what is in it |
+|---|---|
+| system | the administration, to give the servers these tokens |
+| fleet | the streams, and the administration |
+| robots | robots |
+| people | people and programs that read |
+| commanders | people that may send robots commands, too |
+| receivers | receivers of recordings |
+
+Only the account `fleet` stores anything. The others reach what they need of it, and of one another, by
+services (hub/permissions.py).
 
 An account's token also says which users' keys are revoked. A server keeps the newest it has seen, in its
 configuration or on its own disk.
@@ -10,7 +22,7 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import UserError
-from common.private_files import write_private
+from common.private_files import write_all_private, write_private
 from fleet.identity import Account, Key, KeyKind, account_jwt
 from hub import permissions
 from hub.directory import HubDirectory, KeyName
@@ -20,9 +32,20 @@ _KEYS: Final[dict[KeyName, KeyKind]] = {
     "operator": KeyKind.OPERATOR,
     "fleet": KeyKind.ACCOUNT,
     "robots": KeyKind.ACCOUNT,
+    "people": KeyKind.ACCOUNT,
+    "commanders": KeyKind.ACCOUNT,
+    "receivers": KeyKind.ACCOUNT,
     "system": KeyKind.ACCOUNT,
 }
-_ACCOUNTS: Final[tuple[KeyName, ...]] = ("system", "fleet", "robots")
+_ACCOUNTS: Final[tuple[permissions.AccountName, ...]] = (
+    "system",
+    "fleet",
+    "receivers",
+    "robots",
+    "people",
+    "commanders",
+)
+"""In the order in which servers get them: those that export come first."""
 _END_OF_TIME_S: Final = 253_402_300_799
 """The last second of the year 9999: servers refuse tokens that were issued until then."""
 
@@ -30,6 +53,16 @@ _END_OF_TIME_S: Final = 253_402_300_799
 def new_account_keys() -> dict[KeyName, Key]:
     """Returns new keys of the operator and the accounts."""
     return {name: Key.new(kind) for name, kind in _KEYS.items()}
+
+
+def add_accounts(directory: HubDirectory) -> None:
+    """Makes the keys of the accounts that a hub of an earlier version lacks.
+
+    Raises:
+        UserError: one can't be written.
+    """
+    missing = directory.missing_accounts()
+    write_all_private({directory.path / "keys" / f"{name}.nk": Key.new(_KEYS[name]).seed for name in missing})
 
 
 def account_keys(directory: HubDirectory) -> dict[KeyName, Key]:
@@ -44,7 +77,7 @@ def account_keys(directory: HubDirectory) -> dict[KeyName, Key]:
 def account_tokens(
     keys: Mapping[KeyName, Key], fleet: str, revoked: Mapping[str, int], issued: int
 ) -> dict[str, str]:
-    """Returns the tokens of the three accounts, by public key.
+    """Returns the tokens of the accounts, by public key, in the order in which servers get them.
 
     Args:
         keys: of `account_keys`.
@@ -54,19 +87,25 @@ def account_tokens(
     """
     # A key is never used again, so whatever it has signed is revoked, also by a clock that was ahead.
     revoked = dict.fromkeys(revoked, _END_OF_TIME_S)
-    services = permissions.SERVICES
-    fleet_key = keys["fleet"].public
+    table = permissions.IMPORTS
     accounts = {
-        "system": Account("system"),
-        "fleet": Account(fleet, stores=True, exports=services, revoked=revoked),
-        "robots": Account(
-            f"{fleet} robots", imports=tuple((fleet_key, each) for each in services), revoked=revoked
-        ),
+        name: Account(
+            {"system": name, "fleet": fleet}.get(name, f"{fleet} {name}"),
+            stores=name == "fleet",
+            # Several accounts may import the same.
+            exports=tuple(dict.fromkeys(each for row in table.values() for each in row.get(name, ()))),
+            imports=tuple(
+                (keys[exporter].public, each)
+                for exporter, services in table.get(name, {}).items()
+                for each in services
+            ),
+            revoked={} if name == "system" else revoked,
+        )
+        for name in _ACCOUNTS
     }
-    named = {name: keys[name] for name in _ACCOUNTS}
     return {
-        key.public: account_jwt(keys["operator"], key.public, accounts[name], issued_unix_s=issued)
-        for name, key in named.items()
+        keys[name].public: account_jwt(keys["operator"], keys[name].public, account, issued_unix_s=issued)
+        for name, account in accounts.items()
     }
 
 

@@ -5,6 +5,7 @@
 | the hub is unreachable during `enroll` | the robot's files are not written; repeat it |
 | `enroll` for an enrolled robot | refused, unless `again`: then new keys, and the old ones are revoked |
 | a server is down during `revoke` | the others refuse the robot at once, it within 15 s of its start |
+| a hub of an earlier version is administered | all but `apply` is refused, which moves its people first |
 | nothing of the hub answers during `revoke` | the revocation is in the directory; `apply` repeats it |
 | a server loses its disk | it knows the revocations of its nats.conf, and all after `apply` |
 """
@@ -26,13 +27,38 @@ from fleet.connection import Hub, connect
 from fleet.errors import HubError, HubReason
 from fleet.identity import Credentials, Permissions, new_user
 from hub import permissions, streams
-from hub.accounts import account_keys, account_tokens
-from hub.directory import HubDirectory, HubRecord, Kind, User, check_name
+from hub.accounts import account_keys, account_tokens, add_accounts
+from hub.directory import HubDirectory, HubRecord, KeyName, Kind, User, check_name
 
 _CONNECT_S: Final = 5.0
 _PUSH_WITHIN_S: Final = 3.0
 _ELECTED_WITHIN_S: Final = 15.0
 """A cluster that lost a server has a leader again by then (docs/fleet.md)."""
+
+
+def move_people(directory: HubDirectory) -> tuple[User, ...]:
+    """Gives a hub of an earlier version accounts of people's own, and ends the credentials for the other one.
+
+    Those have rights in the account of the streams, by which their owners could delete what is in it. Servers
+    learn of it from `apply`.
+
+    Returns:
+        People and receivers that need new credentials; none if nothing was missing.
+
+    Raises:
+        UserError: the directory is not a hub's, or can't be written.
+    """
+    with directory.locked():
+        record = directory.read()
+        if not directory.missing_accounts():
+            return ()
+        moved = tuple(each for each in record.users if each.kind != "robot" and each.revoked is None)
+        for user in moved:
+            record = _with_revoked(record.with_user(replace(user, revoked=_now_s())), user.keys)
+        # First: were it interrupted, it would be repeated as long as there are no keys.
+        directory.write(record)
+        add_accounts(directory)
+    return moved
 
 
 async def apply(directory: HubDirectory, limits: streams.StreamLimits | None = None) -> list[str]:
@@ -73,7 +99,9 @@ async def enroll(
         UserError: there is one of this name, or the hub can't be reached or refuses.
     """
     with directory.locked():
-        record, creds = _issue(directory, "robot", robot, permissions.robot(robot), days, again=again)
+        record, creds = _issue(
+            directory, "robot", robot, permissions.robot(robot), days, account="robots", again=again
+        )
         user = record.user("robot", robot)
         assert user is not None  # noqa: S101  # it has just been issued
         async with _connected(directory) as hub:
@@ -181,7 +209,8 @@ def operator_login(
     """
     with directory.locked():
         allowed = permissions.operator(commands=commands)
-        record, creds = _issue(directory, "operator", name, allowed, days, again=again)
+        account: KeyName = "commanders" if commands else "people"
+        record, creds = _issue(directory, "operator", name, allowed, days, account=account, again=again)
         directory.write(record)
     keys = ", ".join(directory.secret("receipts.pub").decode().split())
     return (
@@ -199,7 +228,7 @@ def operator_files(directory: HubDirectory, name: str, out: Path, *, days: float
     """
     with directory.locked():
         allowed = permissions.operator(commands=False)
-        record, creds = _issue(directory, "operator", name, allowed, days, again=again)
+        record, creds = _issue(directory, "operator", name, allowed, days, account="people", again=again)
         directory.write(record)  # First, as in `enroll`.
         write_all_private(
             {
@@ -217,7 +246,9 @@ def receiver_files(directory: HubDirectory, name: str, out: Path, *, days: float
         UserError: there is one of this name.
     """
     with directory.locked():
-        record, creds = _issue(directory, "receiver", name, permissions.receiver(), days, again=again)
+        record, creds = _issue(
+            directory, "receiver", name, permissions.receiver(), days, account="receivers", again=again
+        )
         directory.write(record)  # First, as in `enroll`.
         write_all_private(
             {
@@ -237,6 +268,7 @@ def _issue(
     allowed: Permissions,
     days: float | None,
     *,
+    account: KeyName,
     again: bool,
 ) -> tuple[HubRecord, Credentials]:
     """Makes a user's credentials; returns them with the record that lists it."""
@@ -249,7 +281,7 @@ def _issue(
     if old is not None:
         record = _with_revoked(record, old.keys)
     expires = None if days is None else int(time.time() + days * 86_400)
-    creds, key = new_user(directory.key("robots" if kind == "robot" else "fleet"), name, allowed, expires)
+    creds, key = new_user(directory.key(account), name, allowed, expires)
     keys = (*(old.keys if old else ()), key)
     return record.with_user(User(name, kind, keys)), creds
 

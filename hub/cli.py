@@ -20,7 +20,7 @@ from fleet.servers import exposed_server
 from hub import administration, receipts
 from hub.accounts import refresh_nodes
 from hub.creation import HubPlan, create
-from hub.directory import HubDirectory, Kind
+from hub.directory import HubDirectory, Kind, User
 from hub.receiver.cli import Config, receiver
 from hub.receiver.config import ReceiverSettings
 from hub.server_config import Node, Places
@@ -90,6 +90,12 @@ def apply(
     """
     limits = StreamLimits(events_mib * _MIB, events_days)
     hub = HubDirectory(directory)
+    for user in administration.move_people(hub):
+        # Before the servers are asked: an attempt that fails would not say it again.
+        typer.echo(
+            f"{user.name}: the credentials of this {user.kind} end now. Those of earlier versions could"
+            f" delete what the hub has. For new ones type:  {_again(user, hub)}"
+        )
     differences = _run(administration.apply(hub, limits))
     _refresh_nodes(hub)
     for difference in differences:
@@ -334,6 +340,14 @@ def _run(work: Coroutine[Any, Any, ResultT]) -> ResultT:
         }
         code = ExitCode.UNREACHABLE if error.reason is HubReason.UNREACHABLE else ExitCode.FAILED
         raise UserError(str(error), remedies.get(error.reason, "Try again"), exit_code=code) from error
+
+
+def _again(user: User, hub: HubDirectory) -> str:
+    """Returns what to type for new credentials."""
+    if user.kind == "receiver":
+        return f"robot-bridge hub receiver-credentials --name {user.name} --out DIR --again --dir {hub.path}"
+    command = f"robot-bridge hub operator {user.name} --again --dir {hub.path}"
+    return f"{command}  (a program, as the exporter: with --out DIR; a person with commands: --commands)"
 
 
 def _end_old(hub: HubDirectory, *, again: bool) -> None:

@@ -5,7 +5,7 @@ It stays with the administrator; the servers get `nodes/<n>` alone.
 | file | what |
 |---|---|
 | hub.json | the fleet's name, the servers, replicas, and each user with its public key |
-| keys/{operator,fleet,robots,system}.nk | seeds: of the operator, and of the three accounts |
+| keys/*.nk | seeds: of the operator, and of the accounts (hub/accounts.py) |
 | keys/ca.pem, ca.key | the authority of the servers' certificates |
 | receipts.key, receipts.pub | what receivers sign receipts with, and what robots check them with |
 | admin.creds, system.creds | credentials of the administration |
@@ -17,7 +17,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Final, Literal, Self
 
 from common.ca import KeyPair
 from common.errors import ExitCode, UserError
@@ -27,7 +27,9 @@ from fleet.identity import Key
 from fleet.names import ROBOT_NAME
 
 Kind = Literal["robot", "operator", "receiver"]
-KeyName = Literal["operator", "fleet", "robots", "system"]
+KeyName = Literal["operator", "fleet", "robots", "people", "commanders", "receivers", "system"]
+ACCOUNTS_OF_PEOPLE: Final[tuple[KeyName, ...]] = ("people", "commanders", "receivers")
+"""A hub of an earlier version lacks them: its people and receivers were in the account of the streams."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +155,16 @@ class HubDirectory:
         Raises:
             UserError: it is missing.
         """
+        if name in self.missing_accounts():
+            raise UserError(
+                f"{self.path} is a hub of an earlier version: it has no account '{name}'",
+                f"Type first: robot-bridge hub apply --dir {self.path}",
+            )
         return Key(self.secret(f"keys/{name}.nk").strip())
+
+    def missing_accounts(self) -> tuple[KeyName, ...]:
+        """Returns the accounts that a hub of an earlier version lacks."""
+        return tuple(name for name in ACCOUNTS_OF_PEOPLE if not (self.path / "keys" / f"{name}.nk").exists())
 
     def ca(self) -> KeyPair:
         """Reads the authority of the servers' certificates.

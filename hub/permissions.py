@@ -1,36 +1,52 @@
 """Who may do what at the hub: one table. What is not named here, the servers refuse."""
 
-from typing import Final
+from collections.abc import Mapping
+from typing import Final, Literal
 
 from fleet import names
 from fleet.identity import Permissions, Service
 
+AccountName = Literal["system", "fleet", "robots", "people", "commanders", "receivers"]
 _READ: Final = (
     names.EVENTS,
     names.RESULTS,
     *(f"KV_{bucket}" for bucket in (names.STATES, names.RECORDINGS, names.ROBOTS)),
 )
-"""Streams for people. Not that of commands: who may read it could change the robots' consumers, too."""
+"""Streams for people. Not that of commands."""
 _ANSWER_S: Final = 3600
 """A receiver reads a recording of many GB before its last answer."""
 
-
-SERVICES: Final = (
+_UPLOADS: Final = Service(names.UPLOAD_SUBJECTS, many=True)
+_READING: Final = Service(names.READING_SUBJECTS, many=True)
+_OF_ROBOTS: Final = (
     Service(names.EVENT_SUBJECTS),
     Service(names.RESULT_SUBJECTS),
     Service(f"$KV.{names.STATES}.*"),
-    Service(names.UPLOAD_SUBJECTS, many=True),
     # Under a name of its own: the robots' account, which stores nothing, answers JetStream's subject itself.
     Service(f"$JS.API.CONSUMER.INFO.{names.COMMANDS}.*", local="fleet.$1.time"),
     Service(f"$JS.API.CONSUMER.MSG.NEXT.{names.COMMANDS}.*", many=True),
     Service(f"$JS.ACK.{names.COMMANDS}.*.>"),
 )
-"""What the robots' account may request of the fleet's.
+_OF_PEOPLE: Final = (
+    *(Service(f"$JS.API.DIRECT.GET.{stream}", many=True) for stream in _READ),
+    # As above.
+    *(Service(f"$JS.API.STREAM.INFO.{stream}", local=names.info_subject(stream)) for stream in _READ),
+)
+IMPORTS: Final[Mapping[AccountName, Mapping[AccountName, tuple[Service, ...]]]] = {
+    "robots": {"fleet": _OF_ROBOTS, "receivers": (_UPLOADS,)},
+    "people": {"fleet": _OF_PEOPLE, "receivers": (_READING,)},
+    "commanders": {"fleet": (*_OF_PEOPLE, Service(names.COMMAND_SUBJECTS)), "receivers": (_READING,)},
+    "receivers": {"fleet": (Service(f"$KV.{names.RECORDINGS}.*.*"),)},
+}
+"""What each account may request of which other one.
 
-Robots have an account of their own, without streams. Permissions say where a client may publish, not where it
-may have the answer sent: the server itself publishes that, with all rights of the account. In the account of
-the streams, a pull request with the reply subject $JS.API.STREAM.DELETE.fleet_events deletes that stream
-(measured with 2.15.1). In the robots' account no one takes that subject, nor fleet.<another robot>.ev.>.
+All but the administration are in accounts without streams. Permissions say where a client may publish, not
+where it may have the answer sent: the server itself publishes that, with all rights of the account. In the
+account of the streams, a pull request with the reply subject $JS.API.STREAM.DELETE.fleet_events deletes that
+stream (measured with 2.15.1). In these accounts no one takes that subject, nor fleet.<another robot>.ev.>.
+
+None imports what makes a consumer: that delivers in the account of the streams, to a subject that its maker
+says. People who may not send commands are in an account that does not import them.
 """
 
 
@@ -62,7 +78,8 @@ def operator(*, commands: bool) -> Permissions:
     """
     return Permissions(
         publish=(
-            *_reads(*_READ),
+            *(f"$JS.API.DIRECT.GET.{stream}" for stream in _READ),
+            *(names.info_subject(stream) for stream in _READ),
             names.READING_SUBJECTS,
             *((names.COMMAND_SUBJECTS,) if commands else ()),
         ),
@@ -73,9 +90,8 @@ def operator(*, commands: bool) -> Permissions:
 
 def receiver() -> Permissions:
     """Returns the permissions of the receivers: they answer requests, and list what they have verified."""
-    stream = f"KV_{names.RECORDINGS}"
     return Permissions(
-        publish=(f"$KV.{names.RECORDINGS}.>", *_reads(stream)),
+        publish=(f"$KV.{names.RECORDINGS}.*.*",),
         subscribe=(
             "_INBOX.>",
             *(f"{each} {names.RECEIVERS}" for each in (names.UPLOAD_SUBJECTS, names.READING_SUBJECTS)),
@@ -88,9 +104,3 @@ def receiver() -> Permissions:
 def administrator() -> Permissions:
     """Returns the permissions of the hub's administration: everything within the fleet's account."""
     return Permissions(publish=(">",), subscribe=(">",))
-
-
-def _reads(*streams: str) -> tuple[str, ...]:
-    """What reading a stream takes: a consumer of one's own, which the hub keeps in memory."""
-    calls = ("STREAM.INFO.{}", "CONSUMER.CREATE.{}.>", "CONSUMER.MSG.NEXT.{}.*", "CONSUMER.DELETE.{}.*")
-    return tuple(f"$JS.API.{call.format(stream)}" for stream in streams for call in calls)

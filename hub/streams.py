@@ -53,7 +53,7 @@ def stream_configs(replicas: int, limits: StreamLimits = StreamLimits()) -> dict
 
 
 async def set_up(hub: Hub, replicas: int, limits: StreamLimits = StreamLimits()) -> list[str]:
-    """Makes the streams and buckets that are missing; changes none that exists.
+    """Makes the streams and buckets that are missing; of those that exist, it changes `_READABLE` alone.
 
     Waits for nodes of a cluster that are still joining, JOINING_S in all.
 
@@ -90,6 +90,8 @@ class StreamUse:
         return self.size / self.most if self.most > 0 else 0.0
 
 
+_READABLE: Final = {"allow_direct": True}
+"""People read by direct gets (fleet/direct.py). Hubs that were made before don't have it."""
 REPORTED: Final = (names.EVENTS, names.RESULTS, f"KV_{names.RECORDINGS}")
 """Streams that robots fill, each in proportion to what it sends. When one is full, no robot can add to it."""
 
@@ -100,7 +102,7 @@ async def use_of(hub: Hub, stream: str) -> StreamUse:
     Raises:
         HubError: the hub does not say.
     """
-    info = await hub.api(f"STREAM.INFO.{stream}")
+    info = await hub.stream_info(stream)
     try:
         return StreamUse(stream, int(info["state"]["bytes"]), int(info["config"]["max_bytes"]))
     except (KeyError, TypeError, ValueError) as error:
@@ -153,7 +155,7 @@ async def _make_with_quorum(hub: Hub, name: str, config: dict[str, Any], deadlin
 
 
 async def _make(hub: Hub, name: str, config: dict[str, Any]) -> list[str]:
-    """Creates a stream if it is missing; returns what differs if it is not."""
+    """Creates a stream if it is missing; else lets it be read as it has to be, and returns what differs."""
     try:
         info = await hub.api(f"STREAM.INFO.{name}")
     except HubError as error:
@@ -161,7 +163,11 @@ async def _make(hub: Hub, name: str, config: dict[str, Any]) -> list[str]:
             raise
         await hub.api(f"STREAM.CREATE.{name}", config)
         return []
-    return _differences(name, config, info.get("config", {}))
+    actual = info.get("config", {})
+    if any(actual.get(key) != value for key, value in _READABLE.items()):
+        actual = {**actual, **_READABLE}
+        await hub.api(f"STREAM.UPDATE.{name}", actual)
+    return _differences(name, config, actual)
 
 
 def _stream(subjects: str, max_bytes: int, max_age_ns: int, more: Mapping[str, Any]) -> dict[str, Any]:
@@ -175,6 +181,7 @@ def _stream(subjects: str, max_bytes: int, max_age_ns: int, more: Mapping[str, A
         # Repeats are recognised by their subject, without a window of time.
         "duplicate_window": 1_000_000_000,
         "deny_delete": True,
+        **_READABLE,
         **more,
     }
 
@@ -193,6 +200,7 @@ def _bucket(name: str, max_bytes: int) -> dict[str, Any]:
         "allow_rollup_hdrs": False,
         "deny_delete": True,
         "duplicate_window": 1_000_000_000,
+        **_READABLE,
     }
 
 

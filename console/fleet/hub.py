@@ -3,7 +3,6 @@
 import secrets
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from typing import Final
 
 from console.fleet.board import FleetBoard
@@ -12,7 +11,7 @@ from console.fleet.values import CommandAnswer, FleetItem, StoredRecording, Unre
 from console.fleet.wire import answer_of, command_bytes, items_of, recording_of
 from fleet import names
 from fleet.clock import HubClock
-from fleet.connection import Delivery, Entry, Hub, Start
+from fleet.connection import Entry, Hub, Start, StoredMessage
 from omniseer.fleet.v1.command_pb2 import Command
 
 _MS_PER_S: Final = 1000
@@ -121,14 +120,13 @@ async def read_events(hub: Hub, query: EventQuery) -> AsyncIterator[FleetItem]:
         # By the number of the newest message, not by a clock: none is left out or shown twice at the border.
         start = Start.after(newest.sequence if newest else 0)
     else:
-        since = datetime.fromtimestamp(max(0, query.since_unix_ms) / _MS_PER_S, UTC)
-        start = Start.at(since.isoformat())
+        start = Start.at(query.since_unix_ms / _MS_PER_S)
         if newest and not query.follow and newest.unix_s * _MS_PER_S < query.since_unix_ms:
             return
-    async for delivery in hub.follow(names.EVENTS, subjects, start):
-        for item in _items(delivery):
+    async for message in hub.follow(names.EVENTS, subjects, start):
+        for item in _items(message):
             yield item
-        if newest and not query.follow and delivery.sequence >= newest.sequence:
+        if newest and not query.follow and message.sequence >= newest.sequence:
             return
 
 
@@ -156,13 +154,13 @@ async def send_command(
 async def answer(hub: Hub, robot: str, command_id: str) -> CommandAnswer | Unreadable:
     """Returns a robot's answer to a command, whenever it comes: callers set a deadline."""
     subject = names.result_subject(robot, command_id)
-    async for delivery in hub.follow(names.RESULTS, subject, Start.all()):
-        return answer_of(delivery.subject, delivery.payload)
+    async for message in hub.follow(names.RESULTS, subject, Start.all()):
+        return answer_of(message.subject, message.payload)
     raise AssertionError("a stream that is followed has no end")
 
 
-def _items(delivery: Delivery) -> list[FleetItem]:
-    return list(items_of(delivery.subject, delivery.payload, round(delivery.unix_s * _MS_PER_S)))
+def _items(message: StoredMessage) -> list[FleetItem]:
+    return list(items_of(message.subject, message.payload, round(message.unix_s * _MS_PER_S)))
 
 
 def _newest_first(item: StoredRecording | Unreadable) -> tuple[int, str]:

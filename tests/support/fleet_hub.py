@@ -88,10 +88,10 @@ class FleetHub:
         async with connect(FleetAddress(self.servers.urls)) as hub:
             await hub.connected(_CONNECTED_WITHIN_S)
             # All of them: the stream of a test has no other.
-            deliveries = hub.follow(names.COMMANDS, names.command_subject(robot, "*"), Start.all())
+            messages = hub.follow(names.COMMANDS, names.command_subject(robot, "*"), Start.all())
             listens()
-            async for delivery in deliveries:
-                command = Command.FromString(delivery.payload)
+            async for message in messages:
+                command = Command.FromString(message.payload)
                 subject = names.result_subject(robot, command.command_id)
                 await hub.publish_once(subject, answer(command).SerializeToString())
                 return command

@@ -53,6 +53,12 @@ class SecureHub:
         creds.write_text(login.partition("credentials:\n")[2].partition("authority:")[0], encoding="ascii")
         return self.address(creds)
 
+    def program(self, name: str) -> FleetAddress:
+        """Issues credentials for a program that reads, the exporter; returns how it connects."""
+        out = self.path / name
+        administration.operator_files(self.directory, name, out, days=None, again=False)
+        return self.address(out / "operator.creds")
+
     def receiver(self, name: str = "receiver") -> FleetAddress:
         """Issues credentials for a receiver; returns how it connects."""
         out = self.path / name

@@ -218,7 +218,7 @@ def test_new_events_of_a_robot_without_any(hub: FleetHub, monkeypatch: pytest.Mo
         monkeypatch.setattr(connection, "last", noted)
         items = read_events(connection, EventQuery("lab2", None, follow=True))
         coming = asyncio.ensure_future(anext(items))
-        # What counts as new is what the hub takes after this answer, whenever its consumer is made.
+        # What counts as new is what the hub takes after this answer, whenever it is read.
         await asked.wait()
         await asyncio.to_thread(hub.put_events, batch("lab1", event(2)), batch("lab2", event(1)))
         return await asyncio.wait_for(coming, ENDS_WITHIN_S)

@@ -2,8 +2,7 @@
 
 import asyncio
 import time
-from collections.abc import AsyncGenerator, Iterator
-from contextlib import asynccontextmanager
+from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
@@ -12,12 +11,11 @@ from fleet import names
 from fleet.connection import FleetAddress, Hub, Published, connect
 from fleet.errors import HubError, HubReason, RefusedError
 from fleet.serving import Request
-from fleet.session import Session
 from hub import administration
+from tests.support.attacked_hub import connected, everything, put_marks, thiefs_session
 from tests.support.nats_servers import DEBIAN_SERVER, SERVER
 from tests.support.secure_hub import SecureHub, first_answer, secure_hub
 
-_CONNECT_S = 10.0
 _REVOKED_WITHIN_S = 5.0
 """docs/fleet.md."""
 _SERVERS = [
@@ -47,27 +45,8 @@ def victim(hub: SecureHub) -> FleetAddress:
     return hub.enroll("b")
 
 
-@asynccontextmanager
-async def _connected(address: FleetAddress) -> AsyncGenerator[Hub, None]:
-    async with connect(address) as hub:
-        await hub.connected(_CONNECT_S)
-        yield hub
-
-
-@asynccontextmanager
-async def _session(address: FleetAddress) -> AsyncGenerator[Session, None]:
-    """The thief's own program: no wrapper keeps it from anything."""
-    session = await Session.open(
-        address.servers[0], credentials=address.credentials, ca=address.ca, inbox=address.inbox, name="thief"
-    )
-    try:
-        yield session
-    finally:
-        await session.close()
-
-
 async def test_a_robot_reports_and_takes_its_commands(hub: SecureHub, victim: FleetAddress) -> None:
-    async with _connected(victim) as robot, _connected(hub.administrator()) as administrator:
+    async with connected(victim) as robot, connected(hub.administrator()) as administrator:
         assert await robot.publish_once("fleet.b.ev.run.1", b"event") is Published.DELIVERED
         assert await robot.publish_once("fleet.b.ev.run.1", b"event") is Published.REPEATED
         assert await robot.publish_once("fleet.b.res.c1", b"result") is Published.DELIVERED
@@ -86,7 +65,7 @@ async def test_receivers_answer_the_robot_that_asked(hub: SecureHub, victim: Fle
         for part in (b"1", b"2"):
             await request.respond(request.robot.encode() + request.payload + part)
 
-    async with _connected(hub.receiver()) as receiver, _connected(victim) as robot:
+    async with connected(hub.receiver()) as receiver, connected(victim) as robot:
         await receiver.serve(names.UPLOAD_SUBJECTS, names.RECEIVERS, handle)
         await receiver.put(names.RECORDINGS, "b.rec", b"stored")
         answers = []
@@ -139,7 +118,7 @@ async def test_receivers_answer_the_robot_that_asked(hub: SecureHub, victim: Fle
 )
 @pytest.mark.usefixtures("victim")
 async def test_nothing_of_others_takes_its_messages(thief: FleetAddress, subject: str) -> None:
-    async with _session(thief) as session:
+    async with thiefs_session(thief) as session:
         with pytest.raises(RefusedError, match="do not permit"):
             await session.request(subject, b"", 5.0)
 
@@ -155,7 +134,7 @@ async def test_nothing_of_others_can_be_read(thief: FleetAddress, victim: FleetA
     async def hear(message: object) -> None:
         heard.append(str(message))
 
-    async with _session(thief) as session, _connected(victim) as robot:
+    async with thiefs_session(thief) as session, connected(victim) as robot:
         await session.subscribe(subject, "", hear)
         await robot.publish_once(f"fleet.b.ev.run.{time.monotonic_ns()}", b"event")
         await robot.put(names.STATES, "b", b"state")
@@ -185,9 +164,9 @@ async def test_no_answer_goes_into_the_place_of_another(
     hub: SecureHub, thief: FleetAddress, reply: str
 ) -> None:
     """The servers publish answers with all rights of an account, wherever a client has them sent."""
-    async with _connected(hub.administrator()) as administrator, _session(thief) as session:
-        await _put_marks(administrator)
-        before = await _everything(administrator)
+    async with connected(hub.administrator()) as administrator, thiefs_session(thief) as session:
+        await put_marks(administrator)
+        before = await everything(administrator)
         await session.send(f"fleet.a.ev.reply.{time.monotonic_ns()}", b"event", reply)
         await session.send("$KV.fleet_state.a", b"state", reply)
         for request in (
@@ -201,7 +180,7 @@ async def test_no_answer_goes_into_the_place_of_another(
         await session.send("fleet.a.up.begin_file", b"", reply)
         # What was sent before is done when this is.
         await session.request(f"fleet.a.ev.reply.{time.monotonic_ns()}", b"", 5.0)
-        assert await _everything(administrator) == before
+        assert await everything(administrator) == before
 
 
 @pytest.mark.parametrize(
@@ -217,16 +196,16 @@ async def test_no_answer_goes_into_the_place_of_another(
 async def test_no_header_deletes_the_states_of_others(
     hub: SecureHub, thief: FleetAddress, headers: dict[str, str]
 ) -> None:
-    async with _connected(hub.administrator()) as administrator, _session(thief) as session:
-        await _put_marks(administrator)
-        before = await _everything(administrator)
+    async with connected(hub.administrator()) as administrator, thiefs_session(thief) as session:
+        await put_marks(administrator)
+        before = await everything(administrator)
         for subject in ("$KV.fleet_state.a", f"fleet.a.ev.headers.{time.monotonic_ns()}"):
             await session.request(subject, b"", 5.0, headers)
-        assert await _everything(administrator) == before
+        assert await everything(administrator) == before
 
 
 async def test_a_robots_own_messages_have_a_limit(thief: FleetAddress) -> None:
-    async with _session(thief) as session:
+    async with thiefs_session(thief) as session:
         with pytest.raises(HubError):
             await session.request("fleet.a.ev.large.1", b"x" * (600 * 1024), 5.0)
 
@@ -234,64 +213,21 @@ async def test_a_robots_own_messages_have_a_limit(thief: FleetAddress) -> None:
 async def test_a_flood_of_one_costs_the_others_no_events(
     hub: SecureHub, thief: FleetAddress, victim: FleetAddress
 ) -> None:
-    async with _session(thief) as session, _connected(victim) as robot:
+    async with thiefs_session(thief) as session, connected(victim) as robot:
         for sequence in range(3000):
             await session.publish(f"fleet.a.ev.flood.{sequence}", b"x" * 4096)
         for sequence in range(20):
             await _until_delivered(robot, f"fleet.b.ev.flooded.{sequence}")
-    async with _connected(hub.administrator()) as administrator:
+    async with connected(hub.administrator()) as administrator:
         subjects = {"subjects_filter": "fleet.b.ev.flooded.*"}
         info = await administrator.api(f"STREAM.INFO.{names.EVENTS}", subjects)
         assert len(info["state"]["subjects"]) == 20
 
 
-@pytest.mark.usefixtures("thief")
-async def test_operators_read_and_do_not_write(hub: SecureHub) -> None:
-    async with _connected(hub.operator("reader")) as reader:
-        assert "a" in await reader.entries(names.ROBOTS)
-        for work in (
-            reader.publish_once("fleet.a.cmd.c1", b""),
-            reader.put(names.STATES, "a", b""),
-            reader.put(names.ROBOTS, "a", b""),
-            reader.api("STREAM.DELETE.fleet_events"),
-            reader.api("CONSUMER.DELETE.fleet_commands.a"),
-        ):
-            with pytest.raises(RefusedError):
-                await work
-    async with _connected(hub.operator("commander", commands=True)) as commander:
-        assert await commander.publish_once("fleet.a.cmd.c1", b"") is Published.DELIVERED
-
-
-@pytest.mark.usefixtures("thief", "victim")
-async def test_answers_of_receivers_to_people_go_to_inboxes_alone(hub: SecureHub) -> None:
-    """A receiver publishes answers with its own rights, in the account of the streams."""
-    asked: list[str] = []
-
-    async def handle(request: Request) -> None:
-        asked.append(request.robot)
-        await request.respond(b"urls")
-
-    async with (
-        _connected(hub.receiver("receiver2")) as receiver,
-        _connected(hub.administrator()) as administrator,
-        _session(hub.operator("prying")) as session,
-    ):
-        await receiver.serve(names.READING_SUBJECTS, names.RECEIVERS, handle, of_people=True)
-        await _put_marks(administrator)
-        before = await _everything(administrator)
-        subject = names.reading_subject("b", "get_files")
-        for reply in ("$JS.API.STREAM.DELETE.fleet_events", "fleet.a.cmd.c99", "_INBOX_a.x", "_INBOXx.y"):
-            await session.send(subject, b"", reply)
-        # What was sent before is done when this is.
-        assert (await session.request(subject, b"", 5.0)).payload == b"urls"
-        assert await _everything(administrator) == before
-    assert asked == ["b"]
-
-
 @pytest.mark.timed
 async def test_a_revoked_robot_is_out_and_stays_out(hub: SecureHub) -> None:
     address = await asyncio.to_thread(hub.enroll, "c")
-    async with _connected(address) as robot, _connected(hub.administrator()) as administrator:
+    async with connected(address) as robot, connected(hub.administrator()) as administrator:
         begin_s = time.monotonic()
         await administration.revoke(hub.directory, "robot", "c")
         assert await robot.changed.wait_until(lambda: not robot.link.connected, _REVOKED_WITHIN_S)
@@ -311,7 +247,7 @@ async def test_a_robot_enrolled_again_has_new_keys_and_the_old_ones_end(hub: Sec
     async with connect(replace(old, credentials=kept)) as hub_of_old:
         with pytest.raises(RefusedError):
             await first_answer(hub_of_old)
-    async with _connected(old) as robot:
+    async with connected(old) as robot:
         await robot.publish_once("fleet.d.ev.run.1", b"")
 
 
@@ -355,23 +291,3 @@ async def _until_delivered(robot: Hub, subject: str) -> None:
                 await robot.connected()
             else:
                 return
-
-
-async def _put_marks(administrator: Hub) -> None:
-    """A command that waits for b, and a state of it."""
-    await administrator.put(names.STATES, "b", b"mine")
-    await administrator.publish_once(names.command_subject("b", "waits"), b"command")
-
-
-async def _everything(administrator: Hub) -> dict[str, object]:
-    """What the hub keeps of b, and of everything that is not a's."""
-    found: dict[str, object] = {}
-    for stream in (names.EVENTS, names.RESULTS, names.COMMANDS):
-        info = await administrator.api(f"STREAM.INFO.{stream}", {"subjects_filter": "fleet.b.>"})
-        found[stream] = info["state"].get("subjects")
-    for bucket in (names.STATES, names.ROBOTS, names.RECORDINGS):
-        entries = await administrator.entries(bucket)
-        found[bucket] = {key: (each.value, each.revision) for key, each in entries.items() if key != "a"}
-    consumer = await administrator.api(f"CONSUMER.INFO.{names.COMMANDS}.b")
-    found["consumer"] = (consumer["config"], consumer["num_pending"])
-    return found

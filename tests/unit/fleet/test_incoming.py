@@ -2,7 +2,14 @@
 
 import pytest
 
-from fleet.incoming import LARGEST_HEADERS, LONGEST_SUBJECT, read_headers, read_reply, read_subject
+from fleet.incoming import (
+    LARGEST_HEADERS,
+    LONGEST_SUBJECT,
+    read_headers,
+    read_place,
+    read_reply,
+    read_subject,
+)
 
 
 @pytest.mark.parametrize(
@@ -58,3 +65,40 @@ def test_a_subject_that_is_no_text_is_none_of_ours_and_has_no_answer() -> None:
     assert read_reply(b"_INBOX_r1.a.1") == ("_INBOX_r1.a.1", True)
     assert read_reply(b"_INBOX_r1.\xff") == ("", False)
     assert read_reply(b"x" * 5000) == ("", False)
+
+
+_PLACE = (
+    b"Nats-Stream: s\r\nNats-Subject: fleet.r1.ev.run.1\r\nNats-Sequence: 7\r\n"
+    b"Nats-Time-Stamp: 2026-01-31T12:00:00Z\r\nNats-Num-Pending: 3\r\nNats-Last-Sequence: 0\r\n\r\n"
+)
+
+
+@pytest.mark.parametrize(
+    "before",
+    [
+        b"NATS/1.0\r\n",
+        b"NATS/1.0 204 EOB\r\nNats-Sequence: 1\r\nNats-Subject: fleet.r2.ev.run.1\r\n",
+        # As servers do with headers that do not end as they have to.
+        b"NATS/1.0\r\nNats-Sequence:",
+        b"\xff" * 60_000 + b"\r\nNats-Subject: other\r\n",
+    ],
+)
+def test_the_place_in_a_stream_is_what_the_hub_says(before: bytes) -> None:
+    assert read_place(before + _PLACE) == {
+        "Nats-Subject": "fleet.r1.ev.run.1",
+        "Nats-Sequence": "7",
+        "Nats-Time-Stamp": "2026-01-31T12:00:00Z",
+        "Nats-Num-Pending": "3",
+        "Nats-Last-Sequence": "0",
+    }
+
+
+def test_what_an_older_hub_does_not_say_its_sender_can_not_say() -> None:
+    said = b"NATS/1.0\r\nNats-Num-Pending: 9\r\nNats-Last-Sequence: 0\r\n"
+    place = read_place(said + _PLACE.partition(b"Nats-Num")[0])
+    assert set(place) == {"Nats-Subject", "Nats-Sequence", "Nats-Time-Stamp"}
+
+
+def test_a_message_that_is_of_no_stream_has_no_place() -> None:
+    assert read_place(b"NATS/1.0 404 Message Not Found\r\n\r\n") == {}
+    assert read_place(b"NATS/1.0 204 EOB\r\nNats-Num-Pending: 0\r\nNats-Last-Sequence: 6\r\n\r\n") == {}

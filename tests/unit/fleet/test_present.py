@@ -1,18 +1,19 @@
 """Reading what is in a stream now, of a hub that has too much, or never comes to an end."""
 
 import json
-from collections.abc import AsyncIterator
-from contextlib import aclosing, asynccontextmanager
-from types import SimpleNamespace
+from collections.abc import Iterator
+from contextlib import aclosing, contextmanager
 from typing import Any
 
 import pytest
 
-from fleet import consuming
+from fleet import direct
 from fleet.connection import FleetAddress, Hub
-from fleet.consuming import Start, present
+from fleet.direct import present
 from fleet.errors import HubError, HubReason
 from fleet.replies import Message, Waiter
+
+_TAKEN = "2026-01-31T12:00:00.123456789Z"
 
 
 class Answering:
@@ -22,82 +23,83 @@ class Answering:
         announced: how many messages the hub says that there are.
         endless: whether it says after each one that more follow than it has sent.
         size: of each, in bytes.
+        old: whether it is older than 2.11: one message for a request, and nothing of those to come.
 
     Attributes:
         sent: how many it has sent.
-        filters: of the consumers that were made.
-        forgotten: how many consumers were deleted.
+        read: how many of them were passed on.
+        filters: of the requests.
     """
 
-    def __init__(self, announced: int, *, endless: bool = False, size: int = 1) -> None:
-        self._announced, self._endless, self._size = announced, endless, size
-        self.lost = SimpleNamespace(done=lambda: False)
-        self.sent = 0
+    def __init__(self, announced: int, *, endless: bool = False, size: int = 1, old: bool = False) -> None:
+        self._announced, self._endless, self._size, self._old = announced, endless, size, old
+        self.sent = self.read = 0
         self.filters: list[str] = []
-        self.forgotten = 0
 
-    async def api(self, _call: str, request: Any, _timeout_s: float) -> dict[str, Any]:
-        self.filters.append(request["config"]["filter_subject"])
-        return {"num_pending": self._announced}
-
-    @asynccontextmanager
-    async def channel(self, subject: str) -> AsyncIterator[tuple[Waiter, str]]:
+    @contextmanager
+    def waiter(self, subject: str) -> Iterator[tuple[Waiter, str]]:
         self._waiter = Waiter(subject)
         yield self._waiter, "_INBOX.x"
 
     async def send(self, _subject: str, payload: bytes, _reply: str) -> None:
-        for _ in range(_batch(payload)):
+        request = json.loads(payload)
+        self.filters.append(request["next_by_subj"])
+        assert request["seq"] == self.sent + 1
+        previous = 0
+        for _ in range(1 if self._old else request["batch"]):
+            if self.sent == self._announced and not self._endless:
+                break
             self.sent += 1
+            self._waiter.take(self._message(previous))
+            previous = self.sent
+        if not self._old or self.sent == self._announced:
+            status = "204" if previous else "404"
+            self._waiter.take(Message("_INBOX.x", b"", {"Status": status}, ""))
+
+    def _message(self, previous: int) -> Message:
+        place = {"Nats-Subject": f"$KV.b.r{self.sent}", "Nats-Sequence": str(self.sent)}
+        if not self._old:
             pending = self.sent + 1 if self._endless else self._announced - self.sent
-            place = f"$JS.ACK.KV_b.c.1.{self.sent}.{self.sent}.1700000000000000000.{pending}"
-            self._waiter.take(Message(f"$KV.b.r{self.sent}", b"x" * self._size, {}, place))
-
-    async def publish(self, _subject: str, _payload: bytes) -> None:
-        self.forgotten += 1
-
-
-def _batch(payload: bytes) -> int:
-
-    return int(json.loads(payload)["batch"])
+            place |= {"Nats-Num-Pending": str(pending), "Nats-Last-Sequence": str(previous)}
+        return Message("_INBOX.x", b"x" * self._size, place | {"Nats-Time-Stamp": _TAKEN}, "")
 
 
 async def read(session: Answering) -> int:
     """Reads all; returns how many there were."""
     hub: Any = session
-    count = 0
-    async with aclosing(present(hub, "KV_b", "$KV.b.>", Start.last_per_subject(), 1)) as deliveries:
-        async for _ in deliveries:
-            count += 1
-    return count
+    async with aclosing(present(hub, "KV_b", "$KV.b.>", 1)) as messages:
+        async for _ in messages:
+            session.read += 1
+    return session.read
 
 
 @pytest.fixture(autouse=True)
 def bounds(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(consuming, "MOST_PRESENT", 1000)
-    monkeypatch.setattr(consuming, "MOST_PRESENT_BYTES", 100_000)
+    monkeypatch.setattr(direct, "MOST_PRESENT", 1000)
+    monkeypatch.setattr(direct, "MOST_PRESENT_BYTES", 100_000)
 
 
-async def test_as_many_as_permitted_are_read() -> None:
-    session = Answering(1000)
-    assert await read(session) == 1000
-    assert session.forgotten == 1
+@pytest.mark.parametrize("old", [False, True])
+@pytest.mark.parametrize("number", [0, 1, 255, 256, 257, 1000])
+async def test_as_many_as_permitted_are_read(number: int, old: bool) -> None:
+    assert await read(Answering(number, old=old)) == number
 
 
 async def test_more_are_refused_before_the_first_is_read() -> None:
     session = Answering(1001)
-    with pytest.raises(HubError, match="1001 messages, more than the 1000 that are read at once") as refused:
+    with pytest.raises(HubError, match="more than the 1000 messages that are read at once") as refused:
         await read(session)
     assert refused.value.reason is HubReason.TOO_MANY
-    assert (session.sent, session.forgotten) == (0, 1)
+    assert (session.read, len(session.filters)) == (0, 1)
 
 
-async def test_a_hub_that_never_comes_to_an_end_is_left() -> None:
-    session = Answering(1, endless=True)
+@pytest.mark.parametrize("old", [False, True])
+async def test_a_hub_that_never_comes_to_an_end_is_left(old: bool) -> None:
+    session = Answering(1, endless=True, old=old)
     with pytest.raises(HubError, match="more than the 1000 messages that are read at once") as refused:
         await read(session)
     assert refused.value.reason is HubReason.TOO_MANY
     assert session.sent <= 1000 + 256
-    assert session.forgotten == 1
 
 
 async def test_bytes_are_bounded_too() -> None:

@@ -1,5 +1,7 @@
 """The table of permissions."""
 
+import pytest
+
 from fleet import names
 from hub import permissions
 
@@ -15,14 +17,37 @@ def test_a_robot_has_no_subject_of_another() -> None:
 
 
 def test_a_robot_can_reach_what_it_may_publish_to_and_nothing_more() -> None:
-    services = {each.subject for each in permissions.SERVICES}
-    assert not any(subject in (">", "$JS.API.>", "fleet.>") for subject in services)
-    assert not any("STREAM" in subject or "CREATE" in subject or "DELETE" in subject for subject in services)
+    services = _services("robots")
+    assert not any("STREAM" in subject for subject in services)
     assert len(services) == len(permissions.robot("r1").publish)
 
 
-def test_operators_never_reach_the_robots_consumers() -> None:
-    for commands in (False, True):
-        allowed = permissions.operator(commands=commands)
-        assert not any(f".{names.COMMANDS}." in subject for subject in allowed.publish)
-        assert (names.COMMAND_SUBJECTS in allowed.publish) is commands
+@pytest.mark.parametrize("account", permissions.IMPORTS)
+def test_no_account_reaches_what_changes_streams_or_makes_consumers(account: permissions.AccountName) -> None:
+    """Permissions don't bound where the servers send answers, nor where consumers deliver."""
+    services = _services(account)
+    assert not any(subject in (">", "$JS.API.>", "fleet.>") for subject in services)
+    changing = ("CREATE", "DELETE", "UPDATE", "PURGE", "RESTORE", "SNAPSHOT", "LEADER")
+    assert not any(word in subject for subject in services for word in changing)
+
+
+@pytest.mark.parametrize("commands", [False, True])
+def test_people_can_reach_what_they_may_publish_to_and_nothing_more(*, commands: bool) -> None:
+    allowed = permissions.operator(commands=commands)
+    account: permissions.AccountName = "commanders" if commands else "people"
+    reachable = {each.local or each.subject for row in permissions.IMPORTS[account].values() for each in row}
+    assert set(allowed.publish) == reachable
+    assert not any(names.COMMANDS in subject for subject in reachable)
+    assert (names.COMMAND_SUBJECTS in reachable) is commands
+
+
+def test_receivers_list_recordings_and_answer() -> None:
+    allowed = permissions.receiver()
+    assert set(allowed.publish) == _services("receivers")
+    taken = {each.partition(" ")[0] for each in allowed.subscribe} - {"_INBOX.>"}
+    exported = {each.subject for row in permissions.IMPORTS.values() for each in row.get("receivers", ())}
+    assert taken == exported
+
+
+def _services(account: permissions.AccountName) -> set[str]:
+    return {each.subject for row in permissions.IMPORTS[account].values() for each in row}
