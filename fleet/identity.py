@@ -143,6 +143,7 @@ class Account:
         stores: whether it may use JetStream.
         exports: requests that it takes from other accounts.
         imports: requests that its users may send to another account, with that one's public key.
+        connections: at any moment, at all servers together.
         revoked: users by public key, with the time in s since 1970 up to which their tokens are not valid.
     """
 
@@ -150,6 +151,7 @@ class Account:
     stores: bool = False
     exports: tuple[Service, ...] = ()
     imports: tuple[tuple[str, Service], ...] = ()
+    connections: int = _UNLIMITED
     revoked: Mapping[str, int] = field(default_factory=dict)
 
 
@@ -163,11 +165,15 @@ def account_jwt(operator: Key, public: str, account: Account, *, issued_unix_s: 
         issued_unix_s: its time of issue. Of two tokens of an account, servers believe the one
             that was issued later, and of two that were issued in the same second any.
     """
-    names = ("subs", "data", "payload", "imports", "exports", "conn", "leaf")
+    names = ("subs", "data", "payload", "imports", "exports", "leaf")
     stored = ("mem_storage", "disk_storage", "streams", "consumer") if account.stores else ()
     claims = {
         "type": "account",
-        "limits": {**dict.fromkeys((*names, *stored), _UNLIMITED), "wildcards": True},
+        "limits": {
+            **dict.fromkeys((*names, *stored), _UNLIMITED),
+            "conn": account.connections,
+            "wildcards": True,
+        },
         "default_permissions": {"pub": {}, "sub": {}},
         "exports": [
             {

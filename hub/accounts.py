@@ -46,6 +46,14 @@ _ACCOUNTS: Final[tuple[permissions.AccountName, ...]] = (
     "commanders",
 )
 """In the order in which servers get them: those that export come first."""
+CONNECTIONS: Final[dict[permissions.AccountName, int]] = {
+    "robots": 3072,
+    "people": 256,
+    "commanders": 256,
+    "receivers": 64,
+}
+"""Together fewer than one server takes (hub/server_config.py), so that the administration finds a place at
+each of them, whatever the owner of a stolen key takes. NATS has no limit for one user."""
 _END_OF_TIME_S: Final = 253_402_300_799
 """The last second of the year 9999: servers refuse tokens that were issued until then."""
 
@@ -99,6 +107,7 @@ def account_tokens(
                 for exporter, services in table.get(name, {}).items()
                 for each in services
             ),
+            connections=CONNECTIONS.get(name, -1),
             revoked={} if name == "system" else revoked,
         )
         for name in _ACCOUNTS

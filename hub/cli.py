@@ -116,9 +116,11 @@ def enroll(
 ) -> None:
     """Enroll a robot: its keys, its commands, its place in the list."""
     hub = HubDirectory(directory)
-    _run(administration.enroll(hub, name, out, days=days, again=again))
-    if again:
-        _refresh_nodes(hub)
+    try:
+        _run(administration.enroll(hub, name, out, days=days, again=again))
+    finally:
+        if again:
+            _refresh_nodes(hub)  # As in `revoke`.
     typer.echo(
         f"{name} is enrolled. Copy {out} to the robot, and point bridge.yaml at it; then delete it here."
     )
@@ -134,8 +136,11 @@ def revoke(
     """Make all credentials invalid; connections end at once."""
     kind: Kind = "operator" if operator else "receiver" if receiver else "robot"
     hub = HubDirectory(directory)
-    _run(administration.revoke(hub, kind, name))
-    _refresh_nodes(hub)
+    try:
+        _run(administration.revoke(hub, kind, name))
+    finally:
+        # Also where the servers could not be reached: those that are down read it when they start.
+        _refresh_nodes(hub)
     typer.echo(f"{name} is revoked.")
 
 
@@ -353,8 +358,10 @@ def _again(user: User, hub: HubDirectory) -> str:
 def _end_old(hub: HubDirectory, *, again: bool) -> None:
     """Has the servers refuse what new credentials have replaced."""
     if again:
-        _run(administration.push_revocations(hub))
-        _refresh_nodes(hub)
+        try:
+            _run(administration.push_revocations(hub))
+        finally:
+            _refresh_nodes(hub)  # As in `revoke`.
 
 
 def _refresh_nodes(hub: HubDirectory) -> None:

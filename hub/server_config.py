@@ -7,7 +7,7 @@ from typing import Final
 
 _PRELOAD: Final = re.compile(r"^resolver_preload \{\n.*?^\}$", re.MULTILINE | re.DOTALL)
 _LIMITS: Final = """\
-# Limits. A robot has one connection; people and receivers a few.
+# Limits. A robot has one connection; people and receivers a few. The accounts' own limits leave some over.
 max_connections: 4096
 max_payload: 1MB
 max_pending: 16MB

@@ -17,7 +17,7 @@ from common.errors import UserError
 from fleet import identity
 from fleet.connection import FleetAddress, connect
 from fleet.errors import HubError, HubReason
-from hub import administration
+from hub import accounts, administration
 from hub.cli import app
 from tests.support.nats_servers import DEBIAN_SERVER, SERVER
 from tests.support.secure_hub import SecureHub, secure_hub
@@ -76,6 +76,17 @@ def test_apply_ends_what_a_server_with_an_old_configuration_has_forgotten(hub: S
     assert _admits(other)
 
 
+def test_a_revocation_that_servers_did_not_hear_of_is_in_their_configuration(hub: SecureHub) -> None:
+    """One that is down, or has no connection left, reads it when it starts."""
+    robot, other = hub.enroll("r1"), hub.enroll("r2")
+    hub.servers.stop(0)
+    with pytest.raises(UserError, match="can't be reached"):
+        _type(hub, "revoke", "r1")
+    hub.servers.start_all()
+    assert not _admits(robot)
+    assert _admits(other)
+
+
 def test_credentials_of_a_clock_that_was_ahead_are_revoked_too(
     hub: SecureHub, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -105,6 +116,41 @@ def test_no_key_exists_that_is_not_listed(hub: SecureHub, monkeypatch: pytest.Mo
         with pytest.raises(UserError, match="No space"):
             issue()
         assert any((each.kind, each.name) == (kind, "one") for each in directory.read().users)
+
+
+@pytest.fixture
+def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[SecureHub]:
+    """Its server takes 24 connections, and 16 of robots."""
+    monkeypatch.setitem(accounts.CONNECTIONS, "robots", 16)
+    hub = SecureHub(tmp_path)
+    config = hub.directory.path / "nodes" / "n0" / "nats.conf"
+    text = config.read_text(encoding="utf-8")
+    assert "max_connections: 4096\n" in text
+    config.write_text(text.replace("max_connections: 4096", "max_connections: 24"), encoding="utf-8")
+    try:
+        hub.start()
+        yield hub
+    finally:
+        hub.servers.close()
+
+
+def test_a_key_that_takes_all_connections_of_robots_is_revoked(small: SecureHub) -> None:
+    """The defect: it took those of the administration, too, which could not revoke it."""
+    thief, other, reader = small.enroll("r1"), small.enroll("r2"), small.operator("reader")
+
+    async def attack() -> None:
+        async with AsyncExitStack() as stack:
+            for _ in range(24):
+                hub = await stack.enter_async_context(connect(thief))
+                await hub.changed.wait_until(lambda hub=hub: hub.link.connected or hub.link.reason, 10.0)  # type: ignore[misc]
+            assert "as many connections as it permits" in hub.link.text
+            assert hub.link.reason is HubReason.UNREACHABLE, "its credentials are good"
+            assert await asyncio.to_thread(_admits, reader)
+            await asyncio.to_thread(_type, small, "revoke", "r1")
+
+    asyncio.run(attack())
+    assert not _admits(thief)
+    assert _admits(other)
 
 
 @pytest.mark.timed

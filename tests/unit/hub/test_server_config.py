@@ -2,6 +2,7 @@
 
 import pytest
 
+from hub.accounts import CONNECTIONS
 from hub.server_config import Node, Places, server_config, with_accounts
 
 NODES = tuple(Node(f"n{number}", f"hub{number}.example") for number in (1, 2, 3))
@@ -26,6 +27,14 @@ def test_one_node_has_no_cluster() -> None:
     assert "sync_interval: always" in text
     assert 'tls { cert_file: "/etc/nats/server.pem"' in text
     assert "ASYS: TOKEN" in text
+
+
+def test_all_other_accounts_leave_connections_for_the_administration() -> None:
+    """Any one node may be the only one that runs."""
+    text = _config(NODES)
+    most = int(text.partition("max_connections: ")[2].partition("\n")[0])
+    assert set(CONNECTIONS) == {"robots", "people", "commanders", "receivers"}
+    assert sum(CONNECTIONS.values()) <= most - 256
 
 
 def test_nodes_of_a_cluster_know_each_other_by_tls() -> None:
