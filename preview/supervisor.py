@@ -31,12 +31,15 @@ What can fail, how it is noticed, and what follows:
 | hardware preferred, only x264 works | selection | runs, and last_error says so |
 | more viewers than srt.max_viewers | asked in SRT's handshake | refused, counted and logged |
 | gateway is gone | no watcher for without_gateway_s | disabled until the next request |
+| listener fails while running | ERROR of the listener | opened again: at once, then with backoff |
+| listener fails again and again | a fourth failure without a steady run | FAULTED, retry with backoff |
 | listener fails while recording | ERROR, deadline of its start | closed, retried with backoff |
 
 HungError ends the process with code 70 (app.py), to be restarted: only that frees the driver. A slow, frozen
-or vanished viewer is no failure: the listener drops it, and the others notice nothing. When another encoder
-takes over, the pipeline is rebuilt whole, listener included: viewers lose the connection for some tenths of a
-second and must reconnect, to a stream of possibly another codec.
+or vanished viewer is no failure: the listener drops it, and the others notice nothing. From GStreamer 1.24 on
+one failed accept ends a listener: viewers are back within a moment, and the encoder goes on. When another
+encoder takes over, the pipeline is rebuilt whole, listener included: viewers lose the connection for some
+tenths of a second and must reconnect, to a stream of possibly another codec.
 
 A fallback, and a camera that an operator chose, are started beside the live camera and take its place in the
 running pipeline (camera_switch.py): viewers stay connected. cameras.py decides which one is to be live.
@@ -93,6 +96,8 @@ GRAPH: Final = "last-fault.dot"
 """File in the runtime directory: the graph of the last failed pipeline."""
 STEADY_AFTER_S: Final = 15.0
 """A pipeline that ran this long has recovered: the backoff starts again."""
+MOST_LISTENER_RETRIES: Final = 3
+"""A listener that fails more often without a steady run fails the pipeline, unless a recording needs it."""
 ENCODER_STOP_S: Final = 0.3
 """How long the next pipeline waits for the encoder of a failed one."""
 
@@ -140,7 +145,10 @@ class Supervisor:
         self._recording: Recording | None = None
         self._listener_backoff = Backoff(FIRST_RETRY_S, LONGEST_RETRY_S)
         self._listener_retry = Timer(self._wake.set)
-        """Runs while a listener that failed during a recording waits for its retry."""
+        """Runs while a listener that failed in a pipeline that goes on waits for its retry."""
+        self._listener_lost = False
+        """Whether the listener has failed, and has been neither closed nor opened again since."""
+        self._listening_since = 0.0
         self._trials: asyncio.Task[bool] | None = None
         self._look: asyncio.Task[SourcePlan] | None = None
         """Plans the camera that the next pipeline starts with."""
@@ -336,12 +344,18 @@ class Supervisor:
             case State.STARTING | State.RUNNING if pipeline and pipeline.plan.profile is not profile:
                 _log.info("profile %s -> %s", pipeline.plan.profile.value, profile.value)
                 await pipeline.switch(profile)
-            case State.RUNNING if pipeline and pipeline.plan.passphrase != self._session:
+            case State.RUNNING if pipeline and self._must_replace_listener(pipeline):
                 _log.info("listener: %s", "closed" if self._session is None else "opened")
+                self._listener_lost = False
+                self._listening_since = asyncio.get_running_loop().time()
                 await pipeline.listen(self._session)
             case _:
                 return False
         return True
+
+    def _must_replace_listener(self, pipeline: Pipeline) -> bool:
+        # A lost one has the right passphrase, once its retry is due.
+        return self._listener_lost or pipeline.plan.passphrase != self._session
 
     @property
     def _session(self) -> str | None:
@@ -395,6 +409,7 @@ class Supervisor:
         self._retry_now = False
         self._marker.set(encoder.name, proven=self._encoders.proven)
         self._forget_listener_retry()
+        self._listener_lost = False
         if self._recording:
             pipeline.record(self._recording.take)
         await pipeline.start()
@@ -459,7 +474,7 @@ class Supervisor:
 
     def first_frame(self) -> None:
         """Handles the first frame of the pipeline."""
-        self._running_since = asyncio.get_running_loop().time()
+        self._running_since = self._listening_since = asyncio.get_running_loop().time()
         self._move(Event.FIRST_FRAME)
         if self._pipeline:
             self._cameras.delivers(self._pipeline.plan.source.camera)
@@ -489,12 +504,21 @@ class Supervisor:
         return any(self._live_and_starting)
 
     def listener_failed(self, fault: Fault) -> bool:
-        """Handles the fault of a listener; a recording goes on without it."""
-        if self._recording is None:
+        """Handles the fault of a listener; whether the pipeline goes on without it, until it is opened again.
+
+        For viewers it does so while it runs, until the listener has failed too often; for a recording always.
+        """
+        running = self._lifecycle.state is State.RUNNING
+        steady = running and asyncio.get_running_loop().time() - self._listening_since > STEADY_AFTER_S
+        if steady:
+            self._listener_backoff.reset()
+        too_often = self._listener_backoff.failures >= MOST_LISTENER_RETRIES
+        if self._recording is None and (not running or too_often):
             return False
         self._last_error.report(fault.text)
-        _log.info("the recording goes on without a listener")
-        self._listener_retry.start(self._listener_backoff.next_s())
+        _log.info("the pipeline goes on without a listener")
+        self._listener_lost = True
+        self._listener_retry.start(0.0 if steady else self._listener_backoff.next_s())
         self._wake.set()
         self.changes.notify_all()
         return True

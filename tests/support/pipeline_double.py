@@ -60,6 +60,8 @@ class PipelineDouble:
         self.stopped = False
         self.key_frames_requested: list[int | None] = []
         self.picture_ages_ms: list[int] = []
+        self.listened: list[str | None] = []
+        """Passphrases of the listeners that took the place of the first one; None: it was closed."""
         self.take: Callable[[AccessUnit], None] | None = None
         self._events = events
         self._script = script or _script_of(plan)
@@ -106,6 +108,11 @@ class PipelineDouble:
         if not self._events.camera_failed(self.plan.source.camera, fault):
             self._fail(fault)
 
+    def lose_listener(self, fault: Fault) -> None:
+        """The listener fails."""
+        if not self._events.listener_failed(fault):
+            self._fail(fault)
+
     def _shown(self, source: SourcePlan) -> None:
         self.starting_camera = None
         if fault := self._script.camera_faults.get(source.camera):
@@ -119,8 +126,9 @@ class PipelineDouble:
 
     async def listen(self, passphrase: str | None) -> None:
         self.plan = replace(self.plan, passphrase=passphrase)
+        self.listened.append(passphrase)
         if passphrase is not None and self._script.listener_faults:
-            self._fail_listener(self._script.listener_faults.pop(0))
+            self.lose_listener(self._script.listener_faults.pop(0))
 
     def record(self, take: Callable[[AccessUnit], None] | None) -> None:
         self.take = take
@@ -159,10 +167,6 @@ class PipelineDouble:
                 self.take(AccessUnit(b"a frame", captured_ns=1, key_frame=True))
             self.measurement = Measurement(self.plan.target.fps, self.plan.target.bitrate_kbps, 0, 10)
             self._events.measured(self._script.viewers_refused)
-
-    def _fail_listener(self, fault: Fault) -> None:
-        if not self._events.listener_failed(fault):
-            self._fail(fault)
 
     def _fail_by_script(self, fault: Fault) -> None:
         if fault.blame is Blame.SOURCE and self._begun and self._serving:

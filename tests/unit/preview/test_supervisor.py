@@ -34,6 +34,7 @@ STUCK = Fault(Blame.ENCODER, "encoder mpp-h265 hung when the profile was changed
 SOURCE = Fault(Blame.SOURCE, "camera /dev/video0 has ended.")
 STALLED = Fault(Blame.SOURCE, "camera /dev/video0 has sent no frame for 1.5 s.")
 BLOCKED = Fault(Blame.SOURCE, "camera /dev/video0 has not started within 5 s.")
+ACCEPT = Fault(Blame.LISTENER, "the SRT listener on port 7100 failed: a caller could not be accepted.")
 PORT = Fault(Blame.LISTENER, "UDP port 7100 on 0.0.0.0 can't be used")
 ON = DesiredState(1, True, Profile.BALANCED)
 OFF = DesiredState(2, False)
@@ -1161,6 +1162,71 @@ async def test_a_pipeline_that_fails_is_retried_for_a_recording(tmp_path: Path) 
         assert (faulted.state, faulted.last_error) == (State.DISABLED, SOURCE.text)
         await pipeline_is(preview, State.RUNNING)
         assert recording.interruptions == 1
+
+
+@row("listener fails while running")
+@in_virtual_time
+async def test_a_listener_that_fails_is_opened_again_and_the_encoder_goes_on(tmp_path: Path) -> None:
+    preview = Preview(tmp_path)
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.RUNNING)
+        await asyncio.sleep(STEADY_AFTER_S + 1)
+        (pipeline,) = preview.pipelines.built
+        failed_at = now()
+        pipeline.lose_listener(ACCEPT)
+        assert preview.supervisor.actual().pipeline_state is State.RUNNING
+        state = await preview.until(
+            lambda actual: actual.state is State.RUNNING and pipeline.listened[-1:] == [""]
+        )
+        assert now() - failed_at < 0.1, "at once, after a steady run"
+        assert (state.last_error, state.counters) == (ACCEPT.text, Counters(starts=1))
+        # The next one, so soon after it, waits.
+        pipeline.lose_listener(ACCEPT)
+        assert (await preview.reaches(State.FAULTED)).pipeline_state is State.RUNNING
+        failed_at = now()
+        await preview.reaches(State.RUNNING)
+        assert now() - failed_at == pytest.approx(1.0, abs=0.1)
+        assert not pipeline.stopped
+    assert len(preview.pipelines.built) == 1
+
+
+@row("listener fails again and again")
+@in_virtual_time
+async def test_a_listener_that_fails_again_and_again_fails_the_pipeline(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, Script(listener_faults=[ACCEPT] * 3))
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.RUNNING)
+        failed_at = now()
+        preview.pipelines.built[0].lose_listener(ACCEPT)
+        state = await preview.until(lambda actual: actual.pipeline_state is State.FAULTED)
+        assert now() - failed_at == pytest.approx(1 + 2 + 4, abs=0.1)
+        assert (state.last_error, state.counters.faults) == (ACCEPT.text, 1)
+        await preview.reaches(State.RUNNING)
+        first, _ = preview.pipelines.built
+        assert first.stopped
+
+
+@pytest.mark.parametrize("recording", [False, True])
+@in_virtual_time
+async def test_a_request_right_after_a_failure_leaves_no_listener_that_has_failed(
+    tmp_path: Path, *, recording: bool
+) -> None:
+    """Before the supervisor has closed it, and although its passphrase is the right one."""
+    preview = Preview(tmp_path)
+    async with preview.serving():
+        if recording:
+            preview.supervisor.record(Recording())
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.RUNNING)
+        (pipeline,) = preview.pipelines.built
+        opened = list(pipeline.listened)
+        pipeline.lose_listener(ACCEPT)
+        preview.supervisor.apply(AGAIN)
+        await asyncio.sleep(100)
+        assert pipeline.listened[len(opened) :] == [""]
+        assert preview.supervisor.actual().state is State.RUNNING
 
 
 @row("listener fails while recording")
