@@ -9,11 +9,12 @@ from typing import Final
 from console.name_lookup import resolve
 from console.receiver.address import StreamAddress
 from console.receiver.delivery import Delivery, DeliveryChoice
-from console.receiver.errors import StreamError, from_srt, undecodable, unresolved
+from console.receiver.errors import StreamError, from_srt, no_picture, undecodable, unresolved
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.libsrt import SrtError, SrtSocket, load
 from console.receiver.options import CLOSES_WITHIN_S, ReceiverOptions
 from console.receiver.reception import Reception
+from console.receiver.rejoins import Rejoins
 from console.receiver.transport_stream import UnknownVideoError
 from console.receiver.unit_decoder import UnitDecoder
 
@@ -29,7 +30,8 @@ class DirectConnection:
     """Connects to the robot, fills a frame queue, and ends the queue with the reason of a failure.
 
     A thread of its own receives; GStreamer decodes on another one. The connection is made anew, without an
-    end, when that is the quickest way to a frame of now: see `Reception`.
+    end, when that is the quickest way to a frame of now: see `Reception`. Where one after the other brings no
+    picture, the stream ends: see `Rejoins`.
 
     Args:
         address: SRT listener to connect to.
@@ -48,6 +50,9 @@ class DirectConnection:
         self._options = options
         self._decoder = UnitDecoder(address, queue, options)
         self._had_data = False
+        self._rejoins = Rejoins(time.monotonic())
+        self._undecoded = False
+        """Whether access units have come over the connections since the newest picture."""
         self._give_up_s: float | None = None
         self.delivery = Delivery(kind=DeliveryChoice.DIRECT)
         """Figures of the delivery; replaced a few times per second."""
@@ -86,14 +91,30 @@ class DirectConnection:
         """Receives over one connection until it is to be made anew, or closed."""
         address = self._address
         host = self._resolved()
+        shown, unit_s = self._queue.put_so_far, self._decoder.newest_s
         try:
             connection = SrtSocket(host, address.port, address.latency_ms, address.passphrase)
             with closing(connection):
-                if self._is_established(connection):
-                    self._take_packets(connection)
+                if not self._is_established(connection):
+                    return
+                self._take_packets(connection)
         except (SrtError, OSError) as error:
             reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
             raise from_srt(address, reason, had_data=self._had_data) from error
+
+        self._pace(shown=self._queue.put_so_far > shown, undecoded=self._decoder.newest_s != unit_s)
+
+    def _pace(self, *, shown: bool, undecoded: bool) -> None:
+        """Waits until the next connection is due, or raises why there is none."""
+        now_s = time.monotonic()
+        pause_s = self._rejoins.pause_s(now_s, shown=shown)
+        self._undecoded = not shown and (undecoded or self._undecoded)
+        if pause_s is not None:
+            self._stopping.wait(pause_s)
+        elif self._undecoded:
+            raise undecodable(self._address, "frames that bring no picture")
+        else:
+            raise no_picture(self._address, self._rejoins.without_s(now_s))
 
     def _resolved(self) -> str:
         """Returns the numeric address of the host, IPv4 where there is one."""

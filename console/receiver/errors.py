@@ -26,6 +26,10 @@ class StreamRefusedError(StreamError):
     """The connection was never established."""
 
 
+class NoPictureError(StreamError):
+    """Packets arrive, but no whole picture, over one connection after the other."""
+
+
 class UndecodableError(StreamError):
     """The stream arrives, but this computer can't decode it."""
 
@@ -101,6 +105,15 @@ def undecodable(address: StreamAddress, content: str) -> UndecodableError:
         f"{address.uri} sends {content}, which this receiver can't decode",
         "Check that this is the robot's preview port: H.264 or H.265 in an MPEG transport stream is expected",
         final=True,
+    )
+
+
+def no_picture(address: StreamAddress, for_s: float) -> NoPictureError:
+    """Returns the error of a stream of which too little arrives."""
+    return NoPictureError(
+        f"packets come from {address.uri}, but no whole picture for {for_s:.0f} s",
+        "The link loses too many of them, as one does that is narrower than the stream. "
+        "Type: robotctl preview on --profile low-bw",
     )
 
 

@@ -22,6 +22,14 @@ def redial_backoff() -> Backoff:
     return Backoff(first_s=0.1, longest_s=0.5)
 
 
+def no_picture_backoff() -> Backoff:
+    """Returns the pauses after connections over which packets came, but no picture; reset in the same way.
+
+    They are longer: each connection begins with a key frame, which costs all viewers.
+    """
+    return Backoff(first_s=1.0, longest_s=5.0)
+
+
 def address_of(preview: PreviewStatus) -> StreamAddress | None:
     """Returns the stream to connect to; None while the preview is off or its stream unknown.
 

@@ -12,7 +12,13 @@ from console.capture_time import CaptureClock
 from console.client import GatewayError, PreviewState, PreviewStatus
 from console.receiver.address import StreamAddress
 from console.receiver.delivery import Delivery, DeliveryChoice
-from console.receiver.errors import StreamError, UndecodableError, hung_too_often, no_frame_within
+from console.receiver.errors import (
+    NoPictureError,
+    StreamError,
+    UndecodableError,
+    hung_too_often,
+    no_frame_within,
+)
 from console.receiver.frame import Frame, PixelFormat
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.options import ReceiverOptions, RequestKeyFrame
@@ -24,6 +30,7 @@ from console.viewer.redial import (
     FIRST_FRAME_TIMEOUT_S,
     address_of,
     deadline_s,
+    no_picture_backoff,
     redial_backoff,
 )
 
@@ -112,6 +119,7 @@ class VideoSession:
         self._hung = 0
         """Connections that were left behind, because they could not be closed."""
         self._backoff = redial_backoff()
+        self._no_picture_backoff = no_picture_backoff()
         self._changed = threading.Condition()
         self._inputs = PlaybackInputs()
         self._address: StreamAddress | None = None
@@ -145,7 +153,7 @@ class VideoSession:
             if invalid:
                 self._inputs = replace(self._inputs, stream_error=invalid, blocked=True)
             if preview.state is PreviewState.RUNNING and before and before.state is not PreviewState.RUNNING:
-                self._backoff.reset()
+                self._reset_backoff()
                 self._changed.notify_all()
             if address != self._address:
                 self._address = address
@@ -211,9 +219,17 @@ class VideoSession:
                 continue
             blocked = not isinstance(error, StreamError) or error.final
             self._update(stream_error=error, blocked=blocked)
-            pause_s = BLOCKED_PAUSE_S if blocked else self._backoff.next_s()
+            pause_s = BLOCKED_PAUSE_S if blocked else self._pause_after(error)
             self._wait(lambda: self._address != address, pause_s)  # noqa: B023 - called at once
             self._update(redials=self._inputs.redials + 1)
+
+    def _pause_after(self, error: UserError) -> float:
+        in_vain = isinstance(error, NoPictureError)
+        return (self._no_picture_backoff if in_vain else self._backoff).next_s()
+
+    def _reset_backoff(self) -> None:
+        self._backoff.reset()
+        self._no_picture_backoff.reset()
 
     def _receive(self, address: StreamAddress) -> UserError:
         """Takes the frames of one connection, and returns why it ended."""
@@ -274,7 +290,7 @@ class VideoSession:
             self._latest, self._suspended = frame, SuspendedTime()
             self.frames += 1
             self._inputs = replace(self._inputs, frame_s=frame.arrival_s, stream_error=None, blocked=False)
-            self._backoff.reset()
+            self._reset_backoff()
         for listener in self._listeners:
             listener(frame)
 

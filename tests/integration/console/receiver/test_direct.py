@@ -21,7 +21,7 @@ from console.receiver.address import StreamAddress
 from console.receiver.connection import connect
 from console.receiver.delivery import DeliveryChoice
 from console.receiver.direct import DirectConnection
-from console.receiver.errors import StreamEndedError, StreamRefusedError
+from console.receiver.errors import NoPictureError, StreamEndedError, StreamRefusedError, UndecodableError
 from console.receiver.frame import Frame
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.libsrt import LibsrtMissingError
@@ -225,6 +225,70 @@ def test_a_decoder_that_is_too_slow_shows_newer_frames_and_bothers_nobody(port: 
         "s that a frame waits for a slow decoder",
         longest_wait_s,
     )
+
+
+@contextmanager
+def played_for_ever(sender: SrtSender, pieces: list[bytes]) -> Iterator[None]:
+    """Sends these again and again, in real time."""
+    done = threading.Event()
+
+    def play_on() -> None:
+        while not done.is_set():
+            for piece in pieces:
+                sender.send(piece)
+                done.wait(FRAME_S)
+
+    playing = threading.Thread(target=play_on, name="player")
+    playing.start()
+    try:
+        yield
+    finally:
+        done.set()
+        playing.join(PATIENCE_S)
+
+
+def test_packets_that_never_make_a_picture_are_an_end_that_says_so(
+    port: int, pieces: list[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No key frame comes, as over a link that loses a part of each."""
+    monkeypatch.setattr(reception, "_FIRST_KEY_FRAME_S", 0.2)
+    with SrtSender(port) as sender, receiver(port, on_picture_lost=lambda _pts: True) as viewer:
+        assert sender.viewer_joined.wait(PATIENCE_S)
+        with (
+            played_for_ever(sender, pieces[1:10]),
+            pytest.raises(NoPictureError, match="no whole picture for"),
+        ):
+            viewer.next_frame(2 * PATIENCE_S)
+        assert viewer.delivery.rejoins >= 2
+
+
+class HangingQueue(FrameQueue):
+    """Takes no frame until it is released, as a decoder's driver that hangs."""
+
+    def __init__(self, released: threading.Event) -> None:
+        super().__init__(FRAMES)
+        self._released = released
+
+    def put(self, _frame: Frame) -> None:
+        self._released.wait(2 * PATIENCE_S)
+
+
+def test_a_decoder_that_hangs_over_all_connections_is_what_is_reported(
+    port: int, pieces: list[bytes], stuck: threading.Event, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Then software can take over, which no new connection makes it do."""
+    monkeypatch.setattr(reception, "_FIRST_KEY_FRAME_S", 0.2)
+    queue, address = HangingQueue(stuck), StreamAddress("127.0.0.1", port, latency_ms=20)
+    with SrtSender(port) as sender:
+        connection = DirectConnection(address, queue, ReceiverOptions(max_age_s=0.2))
+        assert sender.viewer_joined.wait(PATIENCE_S)
+        # A key frame with all that depend on it each second: up to then, what waits is too old.
+        with played_for_ever(sender, pieces[:30]):
+            end = queue.take(time.monotonic() + 2 * PATIENCE_S)
+        stuck.set()
+        assert connection.close()
+    assert isinstance(end, UndecodableError)
+    assert "frames that bring no picture" in end.what
 
 
 def test_ten_viewers(port: int, pieces: list[bytes]) -> None:

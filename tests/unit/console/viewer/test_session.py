@@ -6,11 +6,12 @@ from dataclasses import dataclass, field, replace
 
 import pytest
 
+from common.backoff import Backoff
 from console.client import Unreachable
 from console.client.results import PreviewState
 from console.receiver.address import StreamAddress
 from console.receiver.delivery import Delivery, DeliveryChoice
-from console.receiver.errors import UndecodableError, ended, from_srt
+from console.receiver.errors import UndecodableError, ended, from_srt, no_picture
 from console.receiver.frame import Frame
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.options import ReceiverOptions
@@ -275,6 +276,36 @@ def test_a_connection_that_is_made_anew_by_itself_is_not_silent(
     exchange.show()
     wait_until(lambda: session.frames == 2, "a frame")
     called(exchange, 2)
+
+
+def test_a_stream_of_which_too_little_comes_says_what_to_do_and_is_called_ever_less_often(
+    session: VideoSession, exchange: Exchange, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pauses_s = list[float]()
+    original = Backoff.next_s
+
+    def next_s(self: Backoff) -> float:
+        pauses_s.append(original(self))
+        return 0.0
+
+    monkeypatch.setattr(Backoff, "next_s", next_s)
+    session.follow(preview(PreviewState.RUNNING))
+    for number in range(1, 6):
+        called(exchange, number)
+        address, queue = exchange.calls[-1]
+        queue.end(no_picture(address, 5.0))
+    called(exchange, 6)
+    assert pauses_s == [1.0, 2.0, 4.0, 5.0, 5.0]
+    now = session.playback()
+    assert now.state is PlaybackState.CONNECTING
+    assert now.reason == "packets come from srt://127.0.0.1:7100, but no whole picture for 5 s"
+    assert now.remedy.endswith("Type: robotctl preview on --profile low-bw")
+    exchange.show()
+    wait_until(lambda: session.playback().state is PlaybackState.LIVE, "live")
+    assert session.playback().reason == ""
+    exchange.calls[-1][1].end(no_picture(address, 5.0))
+    called(exchange, 7)
+    assert pauses_s[5:] == [1.0], "a picture begins it anew"
 
 
 def test_a_frame_of_before_a_suspend_is_frozen_for_as_long(
