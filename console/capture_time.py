@@ -47,7 +47,10 @@ class Unwrapped:
         self._latest: int | None = None
 
     def ticks(self, pts_ticks: int) -> int:
-        """Returns a PTS without the wrap, in ticks above 0; nearest to the one before it."""
+        """Returns a PTS without the wrap, in ticks; nearest to the one before it.
+
+        The first one is above 0; one may be below after a stream has run backwards for hours.
+        """
         reference = pts_ticks + WRAP_TICKS if self._latest is None else self._latest
         self._latest = nearest(pts_ticks, reference)
         return self._latest

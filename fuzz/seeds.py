@@ -13,6 +13,7 @@ from common.ca import new_ca
 from common.errors import FieldViolation, InvalidRequestError
 from common.grpc_errors import metadata_of
 from common.video_tap import Header, Kind, encode_object
+from console.capture_time import WRAP_TICKS
 from fuzz import recording
 from fuzz.fleet import REQUESTS, ROBOT
 from fuzz.network import FULL_NAME
@@ -86,13 +87,13 @@ _OVERLAY: Final = overlay_pb2.OverlaySnapshot(
 )
 
 
-def _video(codec: str) -> bytes:
-    """Two frames, in the form of the target."""
+def _video(codec: str, *pts_ticks: int) -> bytes:
+    """A key frame and those after it at these times, in the form of the target."""
     writer = Writer(codec)
     tables = writer.tables()
     packets = [tables[:PACKET_BYTES], tables[PACKET_BYTES:]]
-    for number in range(2):
-        packets += writer.unit(coded_frame(codec, number, key=number == 0), number * 3000)
+    for number, ticks in enumerate(pts_ticks):
+        packets += writer.unit(coded_frame(codec, number, key=number == 0), ticks)
     return b"".join(bytes([number]) + packet for number, packet in enumerate(packets))
 
 
@@ -267,7 +268,12 @@ _SEEDS: Final = {
             event=event_pb2.Event(run_id="a", sequence=5, message="a fault")
         ).SerializeToString()
     ],
-    "video_stream": [_video("h264"), _video("h265")],
+    "video_stream": [
+        _video("h264", 0, 3000),
+        _video("h265", 0, 3000),
+        # Each half a wrap from the last one: backwards, as far as a receiver can say.
+        _video("h264", 0, WRAP_TICKS // 2, 0, WRAP_TICKS // 2),
+    ],
     "video_tap": [_tap()],
     "camera_taps_packet": [
         camera_tap.encode_text(camera_tap.Kind.PROBLEM, "no camera"),

@@ -25,8 +25,10 @@ from common.metrics_endpoint import respond
 from common.printable import escaped, printable, printable_lines
 from common.request_id import begin, current
 from common.trial import TrialError, parse_result
-from console.capture_time import WRAP_TICKS
+from console.capture_time import WRAP_TICKS, ns_to_ticks
 from console.client.mapping.methods import METHODS
+from console.receiver.age import AgeBound
+from console.receiver.decoder_time import DecoderTime
 from console.receiver.reorder import Reorder
 from console.receiver.transport_stream import PACKET_BYTES, TransportStream, UnknownVideoError
 from console.robots.login import parse_login
@@ -212,9 +214,12 @@ def audit_line(data: bytes) -> None:
 def video_stream(data: bytes) -> None:
     """Packets in any order and of any content: what is delivered is in order, and looks like access units.
 
+    Their times are some that GStreamer can hold, and lead back to the time stamp.
+
     Each packet is a byte of its number and up to 188 bytes of its content.
     """
     reorder, stream, delivered = Reorder(0, wait_s=0.25, capacity=64), TransportStream(), 0
+    times, age = DecoderTime(), AgeBound(0.6)
     with suppress(UnknownVideoError):
         for index, start in enumerate(range(0, len(data), 1 + PACKET_BYTES)):
             packet = data[start : start + 1 + PACKET_BYTES]
@@ -225,7 +230,12 @@ def video_stream(data: bytes) -> None:
                     stream.skip(each.missing)
                 for unit in stream.feed(each.payload):
                     assert unit.data
-                    assert unit.pts_ticks is None or 0 <= unit.pts_ticks < WRAP_TICKS
+                    if unit.pts_ticks is not None:
+                        assert 0 <= unit.pts_ticks < WRAP_TICKS
+                        time_ns = times.time_ns(unit.pts_ticks)
+                        assert 0 <= time_ns < 1 << 63
+                        assert ns_to_ticks(time_ns) % WRAP_TICKS == unit.pts_ticks
+                        age.exceeded(now_s, time_ns / 1e9, None)
     assert delivered <= 256
     assert reorder.held <= 64
 

@@ -9,7 +9,14 @@ from typing import Final
 from console.name_lookup import resolve
 from console.receiver.address import StreamAddress
 from console.receiver.delivery import Delivery, DeliveryChoice
-from console.receiver.errors import StreamError, from_srt, no_picture, undecodable, unresolved
+from console.receiver.errors import (
+    StreamError,
+    from_srt,
+    no_picture,
+    receiver_failed,
+    undecodable,
+    unresolved,
+)
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.libsrt import SrtError, SrtSocket, load
 from console.receiver.options import CLOSES_WITHIN_S, ReceiverOptions
@@ -86,6 +93,10 @@ class DirectConnection:
                 self._queue.end(error)
             except UnknownVideoError as error:
                 self._queue.end(undecodable(self._address, str(error)))
+            except Exception as error:
+                # A defect of our own must not look like a robot that sends nothing. stderr has the traceback.
+                self._queue.end(receiver_failed(error))
+                raise
 
     def _receive(self) -> None:
         """Receives over one connection until it is to be made anew, or closed."""

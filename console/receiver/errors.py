@@ -94,6 +94,14 @@ def ended(address: StreamAddress, reason: str = "") -> StreamEndedError:
     )
 
 
+def receiver_failed(error: Exception) -> StreamError:
+    """Returns the error of a defect of the receiver itself."""
+    return StreamError(
+        f"the receiver itself failed: {error!r}",
+        "Another one takes its place; the terminal has the details for a report",
+    )
+
+
 def undecodable(address: StreamAddress, content: str) -> UndecodableError:
     """Returns the error of a stream that arrives but can't be decoded.
 

@@ -6,9 +6,10 @@ from typing import Any, Final
 
 from common.errors import UserError
 from common.gst import GLib, Gst, stop
-from console.capture_time import Unwrapped, ns_to_ticks, ticks_to_ns
+from console.capture_time import ns_to_ticks
 from console.receiver.address import StreamAddress
 from console.receiver.decoder_queue import DecoderQueue
+from console.receiver.decoder_time import DecoderTime
 from console.receiver.decoding import DecodingBranch, element
 from console.receiver.errors import UndecodableError, undecodable
 from console.receiver.file_branch import add_file_branch
@@ -42,7 +43,7 @@ class UnitDecoder:
         self._source: Any = None
         self._waiting = DecoderQueue()
         self._branch: DecodingBranch | None = None
-        self._pts = Unwrapped()
+        self._time = DecoderTime()
         """Over all connections: the decoder's time must not go back."""
         self._received_s: dict[int, float] = {}
         """When the access units that are in the decoder were received, by PTS in ns."""
@@ -113,7 +114,7 @@ class UnitDecoder:
     def _decode(self, received_s: float, unit: AccessUnit) -> None:
         buffer = Gst.Buffer.new_wrapped_bytes(GLib.Bytes.new(unit.data))
         if unit.pts_ticks is not None:
-            buffer.pts = ticks_to_ns(self._pts.ticks(unit.pts_ticks))
+            buffer.pts = self._time.time_ns(unit.pts_ticks)
             self._note_received(buffer.pts, received_s)
         if unit.first:
             buffer.set_flags(Gst.BufferFlags.DISCONT)

@@ -21,12 +21,19 @@ from console.receiver.address import StreamAddress
 from console.receiver.connection import connect
 from console.receiver.delivery import DeliveryChoice
 from console.receiver.direct import DirectConnection
-from console.receiver.errors import NoPictureError, StreamEndedError, StreamRefusedError, UndecodableError
+from console.receiver.errors import (
+    NoPictureError,
+    StreamEndedError,
+    StreamError,
+    StreamRefusedError,
+    UndecodableError,
+)
 from console.receiver.frame import Frame
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.libsrt import LibsrtMissingError
 from console.receiver.options import CLOSES_WITHIN_S, ReceiverOptions
 from console.receiver.reorder import Delivered, Reorder
+from console.receiver.unit_decoder import UnitDecoder
 from tests.support.free import free_udp_port
 from tests.support.promise import keeps
 from tests.support.receiver import NoFrameError, Receiver, show_the_first
@@ -610,6 +617,34 @@ def test_a_stream_whose_pts_wraps_goes_on_with_true_capture_times(port: int, pie
         assert times_ns[0] < WRAP_TICKS * 100_000 // 9 < times_ns[-1]
 
     undisturbed(attempt)
+
+
+def test_time_stamps_that_run_backwards_for_ever_harm_nobody(port: int, pieces: list[bytes]) -> None:
+    """Each frame's is half a wrap from that of the frame before."""
+    half, hour_ticks = WRAP_TICKS // 2, 3600 * 90_000
+    with SrtSender(port) as sender, receiver(port, max_age_s=1e6) as viewer:
+        show_the_first(restamped(pieces[0], -hour_ticks), sender, viewer)
+        for number, piece in enumerate(pieces[1:20], 1):
+            sender.send(restamped(piece, -hour_ticks - number * 3000 + number % 2 * half))
+            assert viewer.next_frame(PATIENCE_S).width == 320
+        assert viewer.delivery.rejoins == 0
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_defect_of_the_receiver_is_an_end_that_says_so(
+    port: int, pieces: list[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(_self: UnitDecoder, _unit: object) -> bool:
+        raise OverflowError("-1 does not fit")
+
+    monkeypatch.setattr(UnitDecoder, "push", fail)
+    with SrtSender(port) as sender, receiver(port) as viewer:
+        assert sender.viewer_joined.wait(PATIENCE_S)
+        with (
+            played_for_ever(sender, pieces),
+            pytest.raises(StreamError, match=r"the receiver itself failed: OverflowError"),
+        ):
+            viewer.next_frame(PATIENCE_S)
 
 
 @pytest.mark.timed
