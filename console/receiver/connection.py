@@ -5,7 +5,7 @@ from console.receiver.address import StreamAddress
 from console.receiver.delivery import DeliveryChoice
 from console.receiver.direct import DirectConnection
 from console.receiver.frame_queue import FrameQueue
-from console.receiver.libsrt import LibsrtMissingError
+from console.receiver.libsrt import DirectImpossibleError
 from console.receiver.options import ReceiverOptions
 from console.receiver.srt import SrtConnection
 
@@ -27,10 +27,9 @@ def connect(
         return SrtConnection(address, queue, options)
     try:
         return DirectConnection(address, queue, options)
-    except LibsrtMissingError as error:
+    except DirectImpossibleError as error:
         if options.delivery is DeliveryChoice.DIRECT:
             raise UserError(
-                f"direct delivery is not possible: {error}",
-                "Type: sudo apt-get install libsrt1.5-gnutls, or choose delivery `auto`",
+                f"direct delivery is not possible: {error}", f"{error.remedy}, or choose delivery `auto`"
             ) from error
-        return SrtConnection(address, queue, options, reason=str(error))
+        return SrtConnection(address, queue, options, reason=str(error), remedy=error.remedy)

@@ -18,13 +18,14 @@ from console.receiver.errors import (
     unresolved,
 )
 from console.receiver.frame_queue import FrameQueue
-from console.receiver.libsrt import SrtError, SrtSocket, load
+from console.receiver.libsrt import LocalSocketError, SrtError, SrtSocket
 from console.receiver.options import CLOSES_WITHIN_S, ReceiverOptions
 from console.receiver.reception import Reception
 from console.receiver.rejoins import Rejoins
 from console.receiver.transport_stream import UnknownVideoError
 from console.receiver.unit_decoder import UnitDecoder
 
+_ANY_HOST: Final = "127.0.0.1"
 _HANDSHAKE_POLL_S: Final = 0.002
 """Period of looking whether the handshake, which takes two round trips, is done."""
 _UNEXPLAINED_S: Final = 3.0
@@ -46,12 +47,13 @@ class DirectConnection:
         options: of the receiver.
 
     Raises:
-        LibsrtMissingError: there is no usable libsrt.
+        DirectImpossibleError: there is no usable libsrt, or it gets no socket.
         UserError: a GStreamer element is not installed.
     """
 
     def __init__(self, address: StreamAddress, queue: FrameQueue, options: ReceiverOptions) -> None:
-        load()
+        # Here, where another delivery can still be chosen.
+        SrtSocket(_ANY_HOST, address.port, address.latency_ms, address.passphrase).close()
         self._address = address
         self._queue = queue
         self._options = options
@@ -106,9 +108,12 @@ class DirectConnection:
         try:
             connection = SrtSocket(host, address.port, address.latency_ms, address.passphrase)
             with closing(connection):
+                connection.connect()
                 if not self._is_established(connection):
                     return
                 self._take_packets(connection)
+        except LocalSocketError as error:
+            raise StreamError(f"no stream from {address.uri}: {error}", error.remedy) from error
         except (SrtError, OSError) as error:
             reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
             raise from_srt(address, reason, had_data=self._had_data) from error

@@ -6,6 +6,7 @@ Names and layouts are those of libsrt's srt.h; the C ABI is the same in all 1.x 
 
 import atexit
 import ctypes
+import errno
 import os
 import select
 import socket
@@ -31,12 +32,33 @@ _CONNECTING: Final = 4
 _CONNECTED: Final = 5
 _EPOLL_IN: Final = 1
 _ERROR: Final = -1
+_TOO_MANY_FILES: Final = (errno.EMFILE, errno.ENFILE)
 _REJ_UNKNOWN: Final = 0
 """SRT_REJ_UNKNOWN: no reason is known."""
 
 
-class LibsrtMissingError(Exception):
-    """No usable libsrt; the text says why."""
+class DirectImpossibleError(Exception):
+    """This computer permits no direct delivery; the text says why.
+
+    Attributes:
+        remedy: what to type.
+    """
+
+    remedy = "Type: sudo apt-get install libsrt1.5-gnutls"
+
+
+class LibsrtMissingError(DirectImpossibleError):
+    """No usable libsrt."""
+
+
+class LocalSocketError(DirectImpossibleError):
+    """No socket can be had, before anything was sent."""
+
+    def __init__(self, cause: Exception) -> None:
+        why = cause.strerror if isinstance(cause, OSError) else None
+        super().__init__(f"libsrt gets no socket: {why or cause}")
+        if isinstance(cause, OSError) and cause.errno in _TOO_MANY_FILES:
+            self.remedy = "Type: ulimit -n 4096, and start this program again"
 
 
 class SrtError(Exception):
@@ -117,7 +139,7 @@ def load() -> Any:
 
 
 class SrtSocket:
-    """A caller's socket that delivers packets as they arrive, with their numbers.
+    """A caller's socket that delivers packets as they arrive, with their numbers; not connected at first.
 
     Without TSBPD (draft-sharabayko-srt-01 4.5) libsrt wakes no waiting receiver at a packet, only at its own
     acknowledgements, every 10 ms. So `wait` watches the UDP socket itself, of which this keeps a duplicate.
@@ -131,19 +153,22 @@ class SrtSocket:
 
     Raises:
         LibsrtMissingError: there is no usable libsrt.
-        SrtError: libsrt refuses.
-        OSError: no socket can be had.
+        LocalSocketError: no socket can be had, or libsrt refuses it.
+        OSError: the host's interface does not exist.
     """
 
     def __init__(self, host: str, port: int, latency_ms: int, passphrase: str) -> None:
         self._srt = load()
-        family, target = _sockaddr(host, port)
-        self._udp = socket.socket(family, socket.SOCK_DGRAM)
+        family, self._target = _sockaddr(host, port)
         self._socket = _ERROR
         self._poll = select.poll()
         self._payload = ctypes.create_string_buffer(LONGEST_PAYLOAD)
         self._control = _MsgCtrl()
         self._event, self._event_size = ctypes.c_int32(), ctypes.c_int(4)
+        try:
+            self._udp = socket.socket(family, socket.SOCK_DGRAM)
+        except OSError as error:
+            raise LocalSocketError(error) from error
         try:
             self._socket = self._check(self._srt.srt_create_socket())
             for option, value in ((_TSBPDMODE, 0), (_TLPKTDROP, 0), (_RCVSYN, 0), (_LATENCY, latency_ms)):
@@ -157,10 +182,17 @@ class SrtSocket:
                 os.close(acquired)
                 raise SrtError(self._last_error())  # noqa: TRY301 - whatever fails here, the socket is closed
             self._poll.register(self._udp, select.POLLIN)
-            self._check(self._srt.srt_connect(self._socket, target, len(target)))
-        except BaseException:
+        except (SrtError, OSError) as error:
             self.close()
-            raise
+            raise LocalSocketError(error) from error
+
+    def connect(self) -> None:
+        """Begins the handshake.
+
+        Raises:
+            SrtError: libsrt refuses.
+        """
+        self._check(self._srt.srt_connect(self._socket, self._target, len(self._target)))
 
     @property
     def connecting(self) -> bool:

@@ -35,15 +35,21 @@ class SrtConnection:
         queue: takes the frames and the end of the stream.
         options: pixel format, decoders and recording.
         reason: why delivery is not direct; empty if it is not meant to be.
+        remedy: what to type so that it is.
 
     Raises:
         UserError: a GStreamer element is not installed.
     """
 
     def __init__(
-        self, address: StreamAddress, queue: FrameQueue, options: ReceiverOptions, reason: str = ""
+        self,
+        address: StreamAddress,
+        queue: FrameQueue,
+        options: ReceiverOptions,
+        reason: str = "",
+        remedy: str = "",
     ) -> None:
-        self.delivery = Delivery(kind=DeliveryChoice.SRT, reason=reason)
+        self.delivery = Delivery(kind=DeliveryChoice.SRT, reason=reason, remedy=remedy)
         """The delivery in use."""
         self.received_s: float | None = None
         """Of direct delivery alone it is known when a frame was received."""

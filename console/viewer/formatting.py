@@ -63,11 +63,15 @@ def figures_line(latest: Frame | None, fps: float, redials: int) -> str:
 
 
 def delivery_text(delivery: Delivery | None) -> str:
-    """Returns the delivery with its figures: direct, round trip 20 ms, 3 packets given up."""
+    """Returns the delivery with its figures: direct, round trip 20 ms, 3 packets given up.
+
+    Where it is not direct, with why and what to type.
+    """
     if delivery is None:
         return ""
     if delivery.kind is DeliveryChoice.SRT:
-        return "SRT latency" + (f" ({delivery.reason})" if delivery.reason else "")
+        why = ". ".join(filter(None, (delivery.reason, delivery.remedy)))
+        return "SRT latency" + (f" ({why})" if why else "")
     return joined(
         "direct",
         f"round trip {delivery.rtt_ms:.0f} ms" if delivery.rtt_ms is not None else "",

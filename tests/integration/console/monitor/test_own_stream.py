@@ -42,7 +42,8 @@ def test_a_fallback_to_the_srt_latency_is_a_warning_with_its_reason(
     def missing() -> None:
         raise LibsrtMissingError("libsrt is not installed")
 
-    monkeypatch.setattr("console.receiver.direct.load", missing)
+    monkeypatch.setattr("console.receiver.libsrt.load", missing)
     with monitor(ground.target) as window:
         row = until(lambda: stream_row(window), "the delivery")
-        assert row == "LATE: SRT latency (libsrt is not installed)"
+        why = "libsrt is not installed. Type: sudo apt-get install libsrt1.5-gnutls"
+        assert row == f"LATE: SRT latency ({why})"

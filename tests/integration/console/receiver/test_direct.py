@@ -19,7 +19,7 @@ from console.capture_time import WRAP_TICKS, CaptureClock, ticks_to_ns
 from console.receiver import libsrt, reception
 from console.receiver.address import StreamAddress
 from console.receiver.connection import connect
-from console.receiver.delivery import DeliveryChoice
+from console.receiver.delivery import Delivery, DeliveryChoice
 from console.receiver.direct import DirectConnection
 from console.receiver.errors import (
     NoPictureError,
@@ -30,7 +30,7 @@ from console.receiver.errors import (
 )
 from console.receiver.frame import Frame
 from console.receiver.frame_queue import FrameQueue
-from console.receiver.libsrt import LibsrtMissingError
+from console.receiver.libsrt import LibsrtMissingError, LocalSocketError
 from console.receiver.options import CLOSES_WITHIN_S, ReceiverOptions
 from console.receiver.reorder import Delivered, Reorder
 from console.receiver.unit_decoder import UnitDecoder
@@ -507,7 +507,7 @@ def test_without_a_descriptor_no_socket_of_srt_is_left(port: int, monkeypatch: p
 
     monkeypatch.setattr(library, "srt_create_socket", count)
     monkeypatch.setattr("console.receiver.libsrt.socket.socket", exhausted)
-    with pytest.raises(OSError, match="Too many open files"):
+    with pytest.raises(LocalSocketError, match="Too many open files"):
         libsrt.SrtSocket("127.0.0.1", port, 20, "")
     assert all(library.srt_getsockstate(each) >= CLOSING for each in made)
 
@@ -519,20 +519,77 @@ def _missing() -> None:
 def test_without_libsrt_the_srt_latency_applies_and_the_reason_is_given(
     port: int, pieces: list[bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("console.receiver.direct.load", _missing)
+    monkeypatch.setattr("console.receiver.libsrt.load", _missing)
     with SrtSender(port) as sender, receiver(port) as viewer:
         assert sender.viewer_joined.wait(PATIENCE_S)
         for piece in pieces[:5]:
             sender.send(piece)
         assert viewer.next_frame(PATIENCE_S).width == 320
-        assert (viewer.delivery.kind, viewer.delivery.reason) == (
-            DeliveryChoice.SRT,
-            "libsrt is not installed",
+        assert viewer.delivery == Delivery(
+            kind=DeliveryChoice.SRT,
+            reason="libsrt is not installed",
+            remedy="Type: sudo apt-get install libsrt1.5-gnutls",
         )
 
 
+@pytest.fixture(params=["descriptors", "srt_setsockopt", "srt_bind_acquire"])
+def no_socket(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
+    """From its call on no socket can be had on this computer, for one of the reasons."""
+    library, make = libsrt.load(), socket.socket
+
+    def exhausted(family: int = -1, kind: int = -1, *more: Any, **others: Any) -> socket.socket:
+        if kind == socket.SOCK_DGRAM:
+            raise OSError(errno.EMFILE, "Too many open files")
+        return make(family, kind, *more, **others)
+
+    def deny() -> None:
+        if request.param == "descriptors":
+            monkeypatch.setattr("console.receiver.libsrt.socket.socket", exhausted)
+        else:
+            monkeypatch.setattr(library, request.param, lambda *_: -1)
+
+    return deny
+
+
+def test_without_a_socket_for_libsrt_the_srt_latency_applies_and_the_reason_is_given(
+    port: int, pieces: list[bytes], no_socket: Callable[[], None]
+) -> None:
+    no_socket()
+    with SrtSender(port) as sender, receiver(port) as viewer:
+        assert sender.viewer_joined.wait(PATIENCE_S)
+        for piece in pieces[:5]:
+            sender.send(piece)
+        assert viewer.next_frame(PATIENCE_S).width == 320
+        delivery = viewer.delivery
+        assert delivery.kind is DeliveryChoice.SRT
+        assert "libsrt gets no socket: " in delivery.reason
+        assert delivery.remedy.startswith("Type: ulimit -n" if "files" in delivery.reason else "Type: sudo")
+    with pytest.raises(UserError, match="direct delivery is not possible: libsrt gets no socket"):
+        receiver(port, delivery=DeliveryChoice.DIRECT)
+
+
+def test_sockets_that_run_out_later_are_not_taken_for_a_silent_robot(
+    port: int, no_socket: Callable[[], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As when the connection is made anew: the next one, of the session, has another delivery."""
+    connect_to_it = DirectConnection._resolved
+
+    def resolved(self: DirectConnection) -> str:
+        no_socket()
+        return connect_to_it(self)
+
+    monkeypatch.setattr(DirectConnection, "_resolved", resolved)
+    with (
+        SrtSender(port),
+        receiver(port) as viewer,
+        pytest.raises(StreamError, match="libsrt gets no socket: ") as caught,
+    ):
+        viewer.next_frame(PATIENCE_S)
+    assert caught.value.remedy.startswith("Type: ")
+
+
 def test_direct_alone_is_an_error_without_libsrt(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("console.receiver.direct.load", _missing)
+    monkeypatch.setattr("console.receiver.libsrt.load", _missing)
     with pytest.raises(UserError, match="direct delivery is not possible: libsrt is not installed"):
         receiver(port, delivery=DeliveryChoice.DIRECT)
 

@@ -16,7 +16,9 @@ from console.receiver.libsrt import SrtSocket
 element = Gst.ElementFactory.make("srtsrc")
 ctypes.pythonapi.Py_IncRef(ctypes.py_object(element))  # as a reference cycle may keep it beyond the end
 for _ in range(300):
-    SrtSocket("127.0.0.1", 9, 20, "").close()
+    made = SrtSocket("127.0.0.1", 9, 20, "")
+    made.connect()
+    made.close()
 time.sleep(float(sys.argv[1]))
 """
 """libsrt frees closed sockets after a second, in its own thread."""

@@ -77,8 +77,10 @@ def test_the_text_of_the_delivery() -> None:
     assert delivery_text(None) == ""
     direct = Delivery(kind=DeliveryChoice.DIRECT, rtt_ms=20.3, given_up=2, rejoins=1)
     assert delivery_text(direct) == "direct, round trip 20 ms, 2 packets given up, rejoined 1x"
-    fallback = Delivery(kind=DeliveryChoice.SRT, reason="libsrt is not installed")
-    assert delivery_text(fallback) == "SRT latency (libsrt is not installed)"
+    remedy = "Type: sudo apt-get install libsrt1.5-gnutls"
+    fallback = Delivery(kind=DeliveryChoice.SRT, reason="libsrt is not installed", remedy=remedy)
+    assert delivery_text(fallback) == f"SRT latency (libsrt is not installed. {remedy})"
+    assert delivery_text(Delivery(kind=DeliveryChoice.SRT)) == "SRT latency"
 
 
 def test_the_line_of_the_recording(tmp_path: Path) -> None:
