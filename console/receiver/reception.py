@@ -11,7 +11,7 @@ from console.capture_time import Unwrapped, ticks_to_ns
 from console.receiver.age import AgeBound
 from console.receiver.delivery import Delivery, LinkStatistics
 from console.receiver.options import ReceiverOptions
-from console.receiver.reorder import Delivered, Reorder
+from console.receiver.reorder import CAPACITY, Delivered, Reorder
 from console.receiver.transport_stream import AccessUnit, TransportStream
 
 _WAIT_S: Final = 0.01
@@ -147,7 +147,7 @@ class Reception:
             while not stopping.is_set():
                 if self._connection.wait(self._timeout_s()):
                     stopping.wait(_SETTLE_S)
-                self._drain()
+                self._drain(stopping)
                 self._sink.feed()
                 now_s = time.monotonic()
                 if self._is_too_old(now_s) or self._is_stuck(now_s) or self._needs_rejoin(now_s):
@@ -164,8 +164,12 @@ class Reception:
         deadline_s = self._reorder.deadline_s
         return _WAIT_S if deadline_s is None else min(_WAIT_S, max(0.0, deadline_s - time.monotonic()))
 
-    def _drain(self) -> None:
-        while packet := self._connection.receive():
+    def _drain(self, stopping: threading.Event) -> None:
+        """Takes what has come. Bounded: a sender may send as fast as this computer takes."""
+        for _ in range(CAPACITY):
+            packet = None if stopping.is_set() else self._connection.receive()
+            if packet is None:
+                break
             self.had_data = True
             self._arrived_s = time.monotonic()
             self._decode(self._reorder.put(*packet, time.monotonic()))

@@ -322,6 +322,39 @@ def test_a_stream_that_pauses_is_not_stuck(played: Played) -> None:
     assert played.stopping.is_set(), "8 s after the last packet"
 
 
+class Flood(Played):
+    """A sender that always has a packet; with the one of this number the receiver is to end."""
+
+    stops_at = 0
+
+    def receive(self) -> tuple[int, bytes]:
+        self.received += 1
+        assert self.received < 100_000, "it is taken without end"
+        if self.received == self.stops_at:
+            self.stopping.set()
+        return self.received - 1, self.packets[self.received % len(self.packets)][2]
+
+
+@pytest.fixture
+def flood(monkeypatch: pytest.MonkeyPatch) -> Flood:
+    made = Flood()
+    monkeypatch.setattr("console.receiver.reception.time.monotonic", lambda: made.now_s)
+    send(made, 30)
+    return made
+
+
+def test_a_sender_that_never_pauses_does_not_keep_it_from_its_end(flood: Flood) -> None:
+    flood.stops_at = 2000
+    flood.run()
+    assert flood.received == 2000
+
+
+def test_a_sender_that_never_pauses_does_not_keep_it_from_its_reports(flood: Flood) -> None:
+    flood.until_s = 100.1
+    flood.run()
+    assert len(flood.reports) > 1
+
+
 def test_the_loss_of_the_last_second_is_reported(played: Played) -> None:
     send(played, 200)
     played.lost_share = 0.125
