@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final, Self
 
+from bench.rows import MeasurementError
+
 _HALVINGS: Final = 50
 
 
@@ -81,6 +83,26 @@ class Window:
     def p99_ms(self) -> float:
         """Capture to decoded, 99th percentile."""
         return statistics.quantiles((one.latency_ms for one in self.glances), n=100)[98]
+
+
+def delivered_of_due_percent(captured_ns: Iterable[int], fps: int) -> float:
+    """Returns how many of the frames that were due between the first and the last capture came, in percent.
+
+    By capture times, each once: the rate at which frames come would say 100 % and more where the first one
+    was late, or where some came twice.
+
+    Args:
+        captured_ns: when each whole frame that came was captured.
+        fps: of the source, which misses none.
+
+    Raises:
+        MeasurementError: of almost nothing there is no share.
+    """
+    each_ns = sorted(set(captured_ns))
+    due = round((each_ns[-1] - each_ns[0]) * fps / 1e9) if each_ns else 0
+    if due == 0:
+        raise MeasurementError(f"{len(each_ns)} frames: nothing was measured")
+    return 100 * (len(each_ns) - 1) / due
 
 
 def longest_gap_ms(glances: Iterable[Glance], from_s: float, until_s: float) -> float:

@@ -14,12 +14,14 @@ from bench.video import (
     product,
     receiver_cpu,
     reference,
+    sixty_fps,
     switching,
 )
 from bench.video.camera import Camera, camera
 from bench.video.far_viewing import FarWatch, watch_far
 from bench.video.window import Glance
 from common.gst import Gst
+from console.client import PreviewProfile
 from preview.config import PreviewSettings
 from preview.encoders.catalogue import CATALOGUE
 from preview.encoders.properties import configure
@@ -156,3 +158,16 @@ def properties(element: Any) -> dict[str, Any]:
         for each in element.list_properties()
         if each.name not in {"name", "parent"}
     }
+
+
+def test_a_round_of_the_film(tmp_path: Path) -> None:
+    film = tmp_path / "film.mp4"
+    sixty_fps.make_film(film)
+    source = {"source": {"kind": "file", "path": str(film)}}
+    with (
+        product.robot(tmp_path, None, sixty_fps.LATENCY_MS, settings=source) as robot,
+        robot.preview(PreviewProfile.HIGH_QUALITY),
+    ):
+        percent, age_ms = sixty_fps.one_round(robot.client.target, WATCH_S)
+    assert 0 < percent <= 100
+    assert age_ms > 0

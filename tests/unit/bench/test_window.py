@@ -2,7 +2,8 @@
 
 import pytest
 
-from bench.video.window import Glance, Glass, Window, longest_gap_ms, slope
+from bench.rows import MeasurementError
+from bench.video.window import Glance, Glass, Window, delivered_of_due_percent, longest_gap_ms, slope
 
 
 def glances(*times_s: tuple[float, float]) -> list[Glance]:
@@ -25,6 +26,32 @@ def test_torn_and_repeated_frames_are_not_delivered() -> None:
 def test_a_repaired_frame_counts_after_a_torn_one() -> None:
     seen = [Glance(1.0, 1.1, corrupt=True), Glance(1.0, 1.2)]
     assert len(Window.of(seen, 1.0, 2.0).glances) == 1
+
+
+FRAME_NS = 10**9 / 60
+
+
+def captured(*numbers: int) -> list[int]:
+    """Capture times of these frames of a film at 60 frames/s, to the tick of 90 kHz."""
+    return [10**15 + round(number * FRAME_NS / 11_111) * 11_111 for number in numbers]
+
+
+def test_a_film_that_comes_whole_is_a_hundred_percent() -> None:
+    assert delivered_of_due_percent(captured(*range(480)), 60) == 100.0
+    # In whatever order: what counts is when frames were captured, so a late first one adds nothing.
+    assert delivered_of_due_percent(captured(3, 1, 2, 0), 60) == 100.0
+
+
+def test_frames_of_a_film_that_are_missing_are_not_made_good_by_those_that_come_twice() -> None:
+    """The rate would not tell: as many came in the same time."""
+    seen = [number for number in (*range(101), *range(50, 60)) if number % 10 != 5]
+    assert delivered_of_due_percent(captured(*seen), 60) == 90.0
+
+
+@pytest.mark.parametrize("numbers", [(), (1,), (1, 1)])
+def test_of_almost_no_frames_of_a_film_there_is_no_share(numbers: tuple[int, ...]) -> None:
+    with pytest.raises(MeasurementError, match="nothing was measured"):
+        delivered_of_due_percent(captured(*numbers), 60)
 
 
 def test_median_and_99th_percentile() -> None:
