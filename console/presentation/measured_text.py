@@ -117,6 +117,7 @@ def video_text(measured: results.PreviewMeasurement, compact: bool, target_kbps:
     """Returns the stream's figures; in full beside the bit rate that it should have."""
     rtt_ms, loss_percent = measured.worst_rtt_ms, measured.worst_loss_percent
     picture_age_ms = measured.worst_picture_age_ms
+    late, given_up = measured.srt_latency_viewer_count, measured.most_packets_given_up
     return joined(
         bit_rate(measured.bitrate_kbps) + ("" if compact else f" of {bit_rate(target_kbps)}"),
         quantity(measured.fps, "fps"),
@@ -126,6 +127,8 @@ def video_text(measured: results.PreviewMeasurement, compact: bool, target_kbps:
         if loss_percent is None or (compact and not loss_percent)
         else f"loss {quantity(loss_percent, '%')}",
         "" if compact or picture_age_ms is None else f"picture {quantity(picture_age_ms, 'ms', 0)} old",
+        "" if compact or not late else f"{plural(late, 'viewer')} at SRT latency",
+        "" if compact or not given_up else f"{plural(given_up, 'packet')} given up",
     )
 
 

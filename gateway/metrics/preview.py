@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from prometheus_client.core import Metric
 
 from gateway.metrics.families import counter, gauge, gauges, info
+from gateway.status.pictures import Pictures
 from gateway.status.preview import CameraState, PreviewState, PreviewView
 from gateway.status.snapshot import Snapshot
 
@@ -57,11 +58,21 @@ def _stream(now: Snapshot) -> Iterator[Metric]:
     yield gauge("preview_frames_per_second", "Leaving.", measured.fps)
     age_s = measured.last_frame_age_ms / 1000
     yield gauge("preview_frame_age_seconds", "Of the newest one that left.", age_s)
-    yield gauge("preview_reporting_viewers", "That report the picture they show.", now.pictures.viewer_count)
-    if now.pictures.worst_age_ms is not None:
-        worst = "Of the oldest picture that a viewer shows, as viewers report it."
-        yield gauge("preview_picture_age_seconds", worst, now.pictures.worst_age_ms / 1000)
+    yield from _reported(now.pictures)
     if measured.worst_rtt_ms is not None:
         yield gauge("preview_worst_rtt_seconds", "Of all viewers.", measured.worst_rtt_ms / 1000)
     if measured.worst_loss_percent is not None:
         yield gauge("preview_worst_loss_percent", "Of all viewers.", measured.worst_loss_percent)
+
+
+def _reported(pictures: Pictures) -> Iterator[Metric]:
+    """What viewers report of the pictures they show."""
+    yield gauge("preview_reporting_viewers", "That report the picture they show.", pictures.viewer_count)
+    by_delivery = {"direct": float(pictures.direct_count), "srt_latency": float(pictures.srt_latency_count)}
+    yield gauges("preview_viewers_by_delivery", "That report how they take it.", "delivery", by_delivery)
+    if pictures.worst_age_ms is not None:
+        worst = "Of the oldest picture that a viewer shows, as viewers report it."
+        yield gauge("preview_picture_age_seconds", worst, pictures.worst_age_ms / 1000)
+    if pictures.most_given_up is not None:
+        most = "The most that a viewer has given up since it connected, as viewers report it."
+        yield gauge("preview_most_packets_given_up", most, pictures.most_given_up)

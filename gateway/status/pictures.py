@@ -59,11 +59,17 @@ class Pictures:
         worst_age_ms: the largest age; None without reports.
         link_age_ms: the same as far as it is beyond the viewers' doubt and may be caused by the link: for the
             adaptive bit rate. None if no report is of that kind.
+        direct_count: viewers of these that take packets as they arrive.
+        srt_latency_count: viewers of these that wait for the SRT latency.
+        most_given_up: the most packets that one of them has given up; None without reports.
     """
 
     viewer_count: int = 0
     worst_age_ms: int | None = None
     link_age_ms: int | None = None
+    direct_count: int = 0
+    srt_latency_count: int = 0
+    most_given_up: int | None = None
 
 
 NO_PICTURES: Final = Pictures()
@@ -90,9 +96,13 @@ class PictureReports:
         if not self._reports:
             return NO_PICTURES
         reports = [report for _, report in self._reports.values()]
+        deliveries = [report.delivery for report in reports]
         of_link = [report for report in reports if report.of_link_ms <= LONGEST_OF_LINK_MS]
         return Pictures(
             viewer_count=len(reports),
             worst_age_ms=max(report.age_ms for report in reports),
             link_age_ms=max((max(0, each.of_link_ms - each.error_ms) for each in of_link), default=None),
+            direct_count=deliveries.count(Delivery.DIRECT),
+            srt_latency_count=deliveries.count(Delivery.SRT_LATENCY),
+            most_given_up=max(report.packets_given_up for report in reports),
         )

@@ -714,7 +714,10 @@ ADDITIONS = [
         + flt(8, 4.5)
         + flt(9, 0.25)
         + uint(10, 140)
-        + uint(11, 2),
+        + uint(11, 2)
+        + uint(16, 1)
+        + uint(17, 1)
+        + uint(18, 4),
         {
             "available": True,
             "stale": True,
@@ -727,6 +730,9 @@ ADDITIONS = [
             "worst_loss_percent": 0.25,
             "worst_picture_age_ms": 140,
             "reporting_viewer_count": 2,
+            "direct_viewer_count": 1,
+            "srt_latency_viewer_count": 1,
+            "most_packets_given_up": 4,
         },
     ),
     Case(

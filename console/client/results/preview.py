@@ -140,6 +140,12 @@ class PreviewMeasurement(Sample):
     """Largest age, from capture to the screen, that any viewer reports of its picture. None if none does."""
     reporting_viewer_count: int | None
     """Viewers that report the picture they show."""
+    direct_viewer_count: int | None
+    """Viewers of these that take packets as they arrive."""
+    srt_latency_viewer_count: int | None
+    """Viewers of these that wait for the SRT latency, and so see every picture later by that much."""
+    most_packets_given_up: int | None
+    """The most packets that one of these viewers has given up since it connected. None if none reports."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

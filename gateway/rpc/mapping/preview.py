@@ -101,4 +101,7 @@ def _measured(
         worst_loss_percent=measurement.worst_loss_percent,
         worst_picture_age_ms=pictures.worst_age_ms,
         reporting_viewer_count=pictures.viewer_count,
+        direct_viewer_count=pictures.direct_count,
+        srt_latency_viewer_count=pictures.srt_latency_count,
+        most_packets_given_up=pictures.most_given_up,
     )

@@ -19,7 +19,7 @@ from gateway.links.preview.feedback import Feedback
 from gateway.links.preview.wire import PreviewConnector
 from gateway.rpc.connections.admission import METHOD_RATES
 from gateway.status.preview import PreviewState
-from omniseer.gateway.v1.preview_pb2 import PICTURE_DELIVERY_DIRECT
+from omniseer.gateway.v1.preview_pb2 import PICTURE_DELIVERY_DIRECT, PICTURE_DELIVERY_SRT_LATENCY
 from omniseer.gateway.v1.robot_gateway_pb2 import ReportPictureRequest, RequestKeyFrameRequest
 from omniseer.gateway.v1.states_pb2 import PREVIEW_RUNNING
 from omniseer.preview.v1 import preview_service_pb2 as pb
@@ -163,14 +163,19 @@ async def test_the_worst_age_is_shown_and_passed_on(tmp_path: Path) -> None:
         await turned_on(operator, double, viewers=2)
         measured = (await operator.status()).preview.measured
         assert (measured.HasField("worst_picture_age_ms"), measured.reporting_viewer_count) == (False, 0)
-        await report(operator, viewer_id="left", picture_age_ms=90, delivery=PICTURE_DELIVERY_DIRECT)
-        await report(operator, viewer_id="right", picture_age_ms=200, picture_age_error_ms=80)
+        assert not measured.HasField("most_packets_given_up")
+        direct = {"delivery": PICTURE_DELIVERY_DIRECT, "packets_given_up": 7}
+        await report(operator, viewer_id="left", picture_age_ms=90, **direct)
+        late = {"delivery": PICTURE_DELIVERY_SRT_LATENCY}
+        await report(operator, viewer_id="right", picture_age_ms=200, picture_age_error_ms=80, **late)
         measured = (
             await eventually(
                 operator.status, lambda s: s.preview.measured.reporting_viewer_count == 2, "both count"
             )
         ).preview.measured
         assert measured.worst_picture_age_ms == 200
+        assert (measured.direct_viewer_count, measured.srt_latency_viewer_count) == (1, 1)
+        assert measured.most_packets_given_up == 7
 
         async def passed_on() -> list[int]:
             return double.picture_ages_ms

@@ -139,6 +139,10 @@ def test_a_running_preview_shows_its_figures_and_where_to_watch() -> None:
     assert "2.48 Mbit/s of 2.50 Mbit/s, 30.0 fps, 1 viewer" in text
     assert "round trip" not in text, "none was measured"
     assert "preview running 30.0 fps 2.48 Mbit/s 1 viewer" in status_line(decoded(message))
+    assert "SRT latency" not in text, "no viewer reports it"
+    measured.srt_latency_viewer_count, measured.most_packets_given_up = 1, 7
+    text = printed(status_view(decoded(message), "robot:50051"))
+    assert "1 viewer, 1 viewer at SRT latency, 7 packets given up" in " ".join(text.split())
 
 
 @pytest.mark.parametrize("width", [40, 80, 200])

@@ -83,7 +83,7 @@ def snapshot(preview: PreviewView = PREVIEW) -> Snapshot:
     noted = Noted(
         faults=(Fault(FAULT, 1.0, 2.0, None, 1), Fault(FAULT, 1.0, 2.0, 3.0, 1)),
         gateway=Runtime("abc", "boot", 61_500, 3, 10, 1),
-        pictures=Pictures(viewer_count=2, worst_age_ms=140, link_age_ms=138),
+        pictures=Pictures(2, 140, 138, direct_count=1, srt_latency_count=1, most_given_up=4),
     )
     return take(setup, board, programs, NOW_S, noted)
 
@@ -253,6 +253,12 @@ def test_the_running_preview() -> None:
     assert shown["robot_gateway_preview_worst_loss_percent", ""] == 6
     assert shown["robot_gateway_preview_reporting_viewers", ""] == 2
     assert shown["robot_gateway_preview_picture_age_seconds", ""] == 0.14
+    by_delivery = [
+        shown["robot_gateway_preview_viewers_by_delivery", f"delivery={each}"]
+        for each in ("direct", "srt_latency")
+    ]
+    assert by_delivery == [1, 1]
+    assert shown["robot_gateway_preview_most_packets_given_up", ""] == 4
 
 
 @pytest.mark.parametrize(

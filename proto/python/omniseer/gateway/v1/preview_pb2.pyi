@@ -463,6 +463,9 @@ class StreamMeasurement(_message.Message):
     WORST_LOSS_PERCENT_FIELD_NUMBER: _builtins.int
     WORST_PICTURE_AGE_MS_FIELD_NUMBER: _builtins.int
     REPORTING_VIEWER_COUNT_FIELD_NUMBER: _builtins.int
+    DIRECT_VIEWER_COUNT_FIELD_NUMBER: _builtins.int
+    SRT_LATENCY_VIEWER_COUNT_FIELD_NUMBER: _builtins.int
+    MOST_PACKETS_GIVEN_UP_FIELD_NUMBER: _builtins.int
     available: _builtins.bool
     """Whether a figure has been taken in this run."""
     stale: _builtins.bool
@@ -491,6 +494,16 @@ class StreamMeasurement(_message.Message):
     """
     reporting_viewer_count: _builtins.int
     """Viewers of which a report counts. Viewers that don't report are in viewer_count alone."""
+    direct_viewer_count: _builtins.int
+    """Viewers of these that take packets as they arrive (PICTURE_DELIVERY_DIRECT)."""
+    srt_latency_viewer_count: _builtins.int
+    """Viewers of these that wait for the SRT latency, and so see every picture later by that much
+    (PICTURE_DELIVERY_SRT_LATENCY). A viewer that does not say how it takes the stream is in neither count.
+    """
+    most_packets_given_up: _builtins.int
+    """The most packets that any of these viewers has given up since it connected: each tore a picture.
+    Unset while none reports.
+    """
     def __init__(
         self,
         *,
@@ -505,13 +518,18 @@ class StreamMeasurement(_message.Message):
         worst_loss_percent: _builtins.float | None = ...,
         worst_picture_age_ms: _builtins.int | None = ...,
         reporting_viewer_count: _builtins.int = ...,
+        direct_viewer_count: _builtins.int = ...,
+        srt_latency_viewer_count: _builtins.int = ...,
+        most_packets_given_up: _builtins.int | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["_last_frame_age_ms", b"_last_frame_age_ms", "_worst_loss_percent", b"_worst_loss_percent", "_worst_picture_age_ms", b"_worst_picture_age_ms", "_worst_rtt_ms", b"_worst_rtt_ms", "last_frame_age_ms", b"last_frame_age_ms", "worst_loss_percent", b"worst_loss_percent", "worst_picture_age_ms", b"worst_picture_age_ms", "worst_rtt_ms", b"worst_rtt_ms"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_last_frame_age_ms", b"_last_frame_age_ms", "_most_packets_given_up", b"_most_packets_given_up", "_worst_loss_percent", b"_worst_loss_percent", "_worst_picture_age_ms", b"_worst_picture_age_ms", "_worst_rtt_ms", b"_worst_rtt_ms", "last_frame_age_ms", b"last_frame_age_ms", "most_packets_given_up", b"most_packets_given_up", "worst_loss_percent", b"worst_loss_percent", "worst_picture_age_ms", b"worst_picture_age_ms", "worst_rtt_ms", b"worst_rtt_ms"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_last_frame_age_ms", b"_last_frame_age_ms", "_worst_loss_percent", b"_worst_loss_percent", "_worst_picture_age_ms", b"_worst_picture_age_ms", "_worst_rtt_ms", b"_worst_rtt_ms", "age_ms", b"age_ms", "available", b"available", "bitrate_kbps", b"bitrate_kbps", "fps", b"fps", "last_frame_age_ms", b"last_frame_age_ms", "reporting_viewer_count", b"reporting_viewer_count", "stale", b"stale", "viewer_count", b"viewer_count", "worst_loss_percent", b"worst_loss_percent", "worst_picture_age_ms", b"worst_picture_age_ms", "worst_rtt_ms", b"worst_rtt_ms"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_last_frame_age_ms", b"_last_frame_age_ms", "_most_packets_given_up", b"_most_packets_given_up", "_worst_loss_percent", b"_worst_loss_percent", "_worst_picture_age_ms", b"_worst_picture_age_ms", "_worst_rtt_ms", b"_worst_rtt_ms", "age_ms", b"age_ms", "available", b"available", "bitrate_kbps", b"bitrate_kbps", "direct_viewer_count", b"direct_viewer_count", "fps", b"fps", "last_frame_age_ms", b"last_frame_age_ms", "most_packets_given_up", b"most_packets_given_up", "reporting_viewer_count", b"reporting_viewer_count", "srt_latency_viewer_count", b"srt_latency_viewer_count", "stale", b"stale", "viewer_count", b"viewer_count", "worst_loss_percent", b"worst_loss_percent", "worst_picture_age_ms", b"worst_picture_age_ms", "worst_rtt_ms", b"worst_rtt_ms"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__last_frame_age_ms: _TypeAlias = _typing.Literal["last_frame_age_ms"]  # noqa: Y015
     _WhichOneofArgType__last_frame_age_ms: _TypeAlias = _typing.Literal["_last_frame_age_ms", b"_last_frame_age_ms"]  # noqa: Y015
+    _WhichOneofReturnType__most_packets_given_up: _TypeAlias = _typing.Literal["most_packets_given_up"]  # noqa: Y015
+    _WhichOneofArgType__most_packets_given_up: _TypeAlias = _typing.Literal["_most_packets_given_up", b"_most_packets_given_up"]  # noqa: Y015
     _WhichOneofReturnType__worst_loss_percent: _TypeAlias = _typing.Literal["worst_loss_percent"]  # noqa: Y015
     _WhichOneofArgType__worst_loss_percent: _TypeAlias = _typing.Literal["_worst_loss_percent", b"_worst_loss_percent"]  # noqa: Y015
     _WhichOneofReturnType__worst_picture_age_ms: _TypeAlias = _typing.Literal["worst_picture_age_ms"]  # noqa: Y015
@@ -520,6 +538,8 @@ class StreamMeasurement(_message.Message):
     _WhichOneofArgType__worst_rtt_ms: _TypeAlias = _typing.Literal["_worst_rtt_ms", b"_worst_rtt_ms"]  # noqa: Y015
     @_typing.overload
     def WhichOneof(self, oneof_group: _WhichOneofArgType__last_frame_age_ms) -> _WhichOneofReturnType__last_frame_age_ms | None: ...
+    @_typing.overload
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__most_packets_given_up) -> _WhichOneofReturnType__most_packets_given_up | None: ...
     @_typing.overload
     def WhichOneof(self, oneof_group: _WhichOneofArgType__worst_loss_percent) -> _WhichOneofReturnType__worst_loss_percent | None: ...
     @_typing.overload

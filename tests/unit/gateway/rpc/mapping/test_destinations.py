@@ -135,7 +135,7 @@ def snapshot(
             Fault(conditions[1], NOW_S - 209, NOW_S - 210, NOW_S - 210, 211),
         ),
         gateway=Runtime("a revision", "a boot", 203, 204, 205, 206, "a run"),
-        pictures=Pictures(viewer_count=82, worst_age_ms=141, link_age_ms=139),
+        pictures=Pictures(82, 141, 139, direct_count=83, srt_latency_count=84, most_given_up=85),
     )
     setup = Setup(Identity("a name", "a version", insecure=insecure), RULES)
     return take(setup, Board(board), Programs(preview, stopped_view(now_s)), now_s, noted)
@@ -278,6 +278,9 @@ PLACES: dict[str, Any] = {
     "preview.measured.worst_loss_percent": 6.5,
     "preview.measured.worst_picture_age_ms": 141,
     "preview.measured.reporting_viewer_count": 82,
+    "preview.measured.direct_viewer_count": 83,
+    "preview.measured.srt_latency_viewer_count": 84,
+    "preview.measured.most_packets_given_up": 85,
     "preview.counters.starts": 92,
     "preview.counters.restarts": 93,
     "preview.counters.faults": 94,

@@ -260,7 +260,7 @@ def everything() -> Snapshot:
         events=(OperatorEvent(1, at_s, "something happened"),),
         faults=(Fault(FAULT, at_s - 1, at_s, None, 1), Fault(FAULT, at_s - 3, at_s - 1, at_s, 2)),
         gateway=Runtime("f" * 40, "boot", 1000, 3, 20, 2, "run"),
-        pictures=Pictures(1, 140, 138),
+        pictures=Pictures(2, 140, 138, direct_count=1, srt_latency_count=1, most_given_up=4),
     )
     return take(setup, board, programs, NOW_S, noted)
 
