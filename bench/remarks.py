@@ -114,5 +114,11 @@ OLDER: Final = (
         "measured with attackers from new addresses in the first turn alone, and `siege.p99` judged by"
         " the median of the turns. Since then every turn has new ones, and the worst turn is judged.",
     ),
+    Older(
+        ("video.age_60_delivered_percent",),
+        frozenset({"b15aab27"}),
+        "measured as the rate at which frames came, of 60 a second, which a late first frame raises beyond"
+        " 100 %. Since then the frames that came are counted by their capture times.",
+    ),
 )
 """Such a remark is no reason why a row misses its bar. It is on the page until the rows are measured anew."""
