@@ -65,7 +65,7 @@ def one_round(target: str, watch_s: float) -> tuple[float, float]:
     timeout_s = watch_s + _ENDS_WITHIN_S
     done = subprocess.run(command, capture_output=True, text=True, timeout=timeout_s, check=True)
     found = json.loads(done.stdout)
-    return delivered_of_due_percent(found["captured_ns"], FPS), found["median_age_ms"]
+    return delivered_of_due_percent(found["captured_ns"], FPS, watch_s), found["median_age_ms"]
 
 
 def make_film(film: Path) -> None:

@@ -9,6 +9,8 @@ from typing import Final, Self
 from bench.rows import MeasurementError
 
 _HALVINGS: Final = 50
+_OLDEST_S: Final = 1.0
+"""How much less than the time watched the captures of a stream that goes on span."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +87,7 @@ class Window:
         return statistics.quantiles((one.latency_ms for one in self.glances), n=100)[98]
 
 
-def delivered_of_due_percent(captured_ns: Iterable[int], fps: int) -> float:
+def delivered_of_due_percent(captured_ns: Iterable[int], fps: int, watched_s: float) -> float:
     """Returns how many of the frames that were due between the first and the last capture came, in percent.
 
     By capture times, each once: the rate at which frames come would say 100 % and more where the first one
@@ -94,11 +96,15 @@ def delivered_of_due_percent(captured_ns: Iterable[int], fps: int) -> float:
     Args:
         captured_ns: when each whole frame that came was captured.
         fps: of the source, which misses none.
+        watched_s: how long frames were waited for from the first one on.
 
     Raises:
-        MeasurementError: of almost nothing there is no share.
+        MeasurementError: of almost nothing there is no share, nor of a stream that ended meanwhile.
     """
     each_ns = sorted(set(captured_ns))
+    span_s = (each_ns[-1] - each_ns[0]) / 1e9 if each_ns else 0.0
+    if span_s < watched_s - _OLDEST_S:
+        raise MeasurementError(f"frames of {span_s:.1f} s came in {watched_s:g} s: nothing was measured")
     due = round((each_ns[-1] - each_ns[0]) * fps / 1e9) if each_ns else 0
     if due == 0:
         raise MeasurementError(f"{len(each_ns)} frames: nothing was measured")

@@ -37,21 +37,26 @@ def captured(*numbers: int) -> list[int]:
 
 
 def test_a_film_that_comes_whole_is_a_hundred_percent() -> None:
-    assert delivered_of_due_percent(captured(*range(480)), 60) == 100.0
+    assert delivered_of_due_percent(captured(*range(480)), 60, 8.0) == 100.0
     # In whatever order: what counts is when frames were captured, so a late first one adds nothing.
-    assert delivered_of_due_percent(captured(3, 1, 2, 0), 60) == 100.0
+    assert delivered_of_due_percent(captured(3, 1, 2, 0), 60, 0.1) == 100.0
 
 
 def test_frames_of_a_film_that_are_missing_are_not_made_good_by_those_that_come_twice() -> None:
     """The rate would not tell: as many came in the same time."""
     seen = [number for number in (*range(101), *range(50, 60)) if number % 10 != 5]
-    assert delivered_of_due_percent(captured(*seen), 60) == 90.0
+    assert delivered_of_due_percent(captured(*seen), 60, 1.7) == 90.0
+
+
+def test_of_a_film_that_ends_too_early_there_is_no_share() -> None:
+    with pytest.raises(MeasurementError, match=r"of 1\.0 s came in 8 s"):
+        delivered_of_due_percent(captured(*range(61)), 60, 8.0)
 
 
 @pytest.mark.parametrize("numbers", [(), (1,), (1, 1)])
 def test_of_almost_no_frames_of_a_film_there_is_no_share(numbers: tuple[int, ...]) -> None:
     with pytest.raises(MeasurementError, match="nothing was measured"):
-        delivered_of_due_percent(captured(*numbers), 60)
+        delivered_of_due_percent(captured(*numbers), 60, 0.5)
 
 
 def test_median_and_99th_percentile() -> None:
