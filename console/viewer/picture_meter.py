@@ -118,9 +118,8 @@ class PictureMeter:
 
     def _end_latest(self, now_s: float) -> None:
         """Notes the freeze that the picture on the screen was, if it was one."""
-        if self._latest and now_s - self._latest.at_s > OVERDUE_S:
-            age_ms = age_now_ms(self._latest, self._now_s())
-            self._freezes.append(Freeze(self._latest, now_s, age_ms))
+        if freeze := self._present_freeze(now_s):
+            self._freezes.append(freeze)
 
     def reading(self) -> PictureReading:
         """Returns the reading of this moment."""
@@ -163,10 +162,9 @@ class PictureMeter:
 
     def worst_ms(self, within_s: float) -> float | None:
         """Returns the largest age of the last `within_s` seconds; None when no picture is on the screen."""
-        now_s, latest = self._now_s(), self.latest()
-        if latest is None:
+        if self.latest() is None:
             return None
-        return max(age_now_ms(latest, now_s), self._worst_since_ms(time.monotonic() - within_s))
+        return self._worst_since_ms(time.monotonic() - within_s)
 
     def summary(self) -> AgeSummary | None:
         """Returns the ages of the last pictures; None without one of known age."""
@@ -180,7 +178,7 @@ class PictureMeter:
         return AgeSummary(
             median_ms=round(statistics.median(ages_ms), 1),
             p95_ms=round(p95_ms, 1),
-            worst_ms=round(self._worst_since_ms(0.0), 1),
+            worst_ms=round(self._worst_since_ms(pictures[0].at_s), 1),
             error_ms=round(max(picture.error_ms for picture in pictures), 2),
             cause=reading(last, self._delivery(), self._preview(), last.at_s).cause,
         )
@@ -192,7 +190,7 @@ class PictureMeter:
         latest = self.latest()
         if latest is None:
             return None
-        age_ms = max(age_now_ms(latest, self._now_s()), self._worst_since_ms(since_s))
+        age_ms = self._worst_since_ms(since_s)
         since = takewhile(lambda each: each.at_s > since_s, reversed(self._pictures()))
         of_link_ms = max([link_age_ms(latest, now_s, self._received()), *(each.link_ms for each in since)])
         delivery = self._delivery()
@@ -215,21 +213,23 @@ class PictureMeter:
         return time.monotonic() + self._suspended.seconds()
 
     def _worst_since_ms(self, since_s: float) -> float:
-        """Returns the largest age of pictures that were shown, or left the screen late, since then; or 0."""
-        shown = takewhile(lambda each: each.at_s > since_s, reversed(self._pictures()))
-        with self._lock:
-            freezes = tuple(self._freezes)
-        late = takewhile(lambda each: each.until_s > since_s, reversed(freezes))
+        """Returns the largest age that a picture on the screen has had since then; 0 without one."""
+        shown = takewhile(lambda each: each.at_s >= since_s, reversed(self._pictures()))
+        late = takewhile(lambda each: each.until_s > since_s, reversed(self._all_freezes()))
         return max([0.0, *(each.age_ms for each in shown), *(each.age_ms for each in late)])
 
     def _all_freezes(self) -> tuple[Freeze, ...]:
         """Returns the freezes, with the present one if there is one."""
-        now_s = time.monotonic()
         with self._lock:
-            latest, freezes = self._latest, tuple(self._freezes)
-            if latest is None or now_s - latest.at_s <= OVERDUE_S:
-                return freezes
-            return (*freezes, Freeze(latest, now_s, age_now_ms(latest, self._now_s())))
+            freeze = self._present_freeze(time.monotonic())
+            return (*self._freezes, freeze) if freeze else tuple(self._freezes)
+
+    def _present_freeze(self, now_s: float) -> Freeze | None:
+        """Returns the freeze that the picture on the screen is by now; None if it is none yet."""
+        latest, until_s = self._latest, self._now_s()
+        if latest is None or until_s - latest.at_s <= OVERDUE_S:
+            return None
+        return Freeze(latest, now_s, age_now_ms(latest, until_s))
 
     def _pictures(self) -> tuple[ShownPicture, ...]:
         with self._lock:

@@ -225,6 +225,20 @@ def test_the_worst_age_of_a_moment_has_short_peaks_and_what_is_frozen(played: Pl
     assert played.meter.worst_ms(0.5) is None
 
 
+def test_the_summary_has_the_freeze_that_lasts_and_none_of_before_its_pictures(played: Played) -> None:
+    played.show(20)
+    played.now_s += 5.0
+    for _ in range(3601):
+        played.show(30)
+    summary = played.meter.summary()
+    assert summary
+    assert summary.worst_ms == 30.0
+    played.now_s += 2.0
+    summary = played.meter.summary()
+    assert summary
+    assert summary.worst_ms == 2030.0
+
+
 def test_the_summary_has_percentiles(played: Played) -> None:
     for number in range(100):
         played.show(10 + number)
