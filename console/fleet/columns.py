@@ -11,9 +11,12 @@ from console.presentation.formatting import UNKNOWN, age, joined, plural, quanti
 from console.presentation.measured_text import number_text
 from console.presentation.severity_style import FAULT_STYLES, HEALTH_STYLES, SeverityStyle
 from console.presentation.value_style import (
+    BATTERY_FAULTS,
     CHARGE_PERCENT,
+    DISK_FAULTS,
     DISK_PERCENT,
     Judgement,
+    no_better,
     of_number,
     of_text,
 )
@@ -117,14 +120,15 @@ def _health(row: FleetRow) -> Cell:
 
 def battery_cell(state: RobotState) -> Cell:
     """Returns the state of charge, with a plus while it is being charged."""
-    found = CHARGE_PERCENT.judge(state.battery_percent)
+    found = _no_better(CHARGE_PERCENT.judge(state.battery_percent), state, BATTERY_FAULTS)
     charging = " +" if state.charging else ""
     return _judged(found, f"{quantity(state.battery_percent, '%', 0)}{charging}")
 
 
 def disk_cell(state: RobotState) -> Cell:
     """Returns the used part of the disk."""
-    return _judged(DISK_PERCENT.judge(state.disk_used_percent), quantity(state.disk_used_percent, "%", 0))
+    found = _no_better(DISK_PERCENT.judge(state.disk_used_percent), state, DISK_FAULTS)
+    return _judged(found, quantity(state.disk_used_percent, "%", 0))
 
 
 def _uploads(state: RobotState) -> Cell:
@@ -176,6 +180,10 @@ def _value(sample: Sample, title: str, text: str, found: Judgement) -> tuple[str
             return f"{title} {text} STALE", SeverityStyle.WARNING
         case Freshness.FRESH:
             return f"{title} {text} {found.word}".rstrip(), found.style
+
+
+def _no_better(found: Judgement, state: RobotState, words: Mapping[str, str]) -> Judgement:
+    return no_better(found, ((fault.fault_id, fault.severity) for fault in state.faults), words)
 
 
 def _judged(found: Judgement, text: str) -> Cell:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from console.client import results
-from console.client.results import Fault, NumberLevel, RecorderState, TextLevel
+from console.client.results import Fault, FaultSeverity, NumberLevel, RecorderState, TextLevel
 from console.presentation.severity_style import FAULT_STYLES, SeverityStyle
 
 
@@ -81,11 +81,12 @@ TEXT_LEVELS: Final[Mapping[TextLevel, Judgement]] = {
 BATTERY_FAULTS: Final[Mapping[str, str]] = {"battery.low": "LOW", "battery.out_of_range": "UNKNOWN"}
 """Words for the faults of a part, by their ids; so are the following."""
 COMPUTER_BATTERY_FAULTS: Final[Mapping[str, str]] = {"platform.battery_low": "LOW"}
+DISK_FAULTS: Final[Mapping[str, str]] = {"platform.disk": "FULL"}
 COMPUTE_FAULTS: Final[Mapping[str, str]] = {
     "platform.temperature": "HOT",
     "platform.throttled": "HOT",
     "platform.memory": "FULL",
-    "platform.disk": "FULL",
+    **DISK_FAULTS,
 }
 NETWORK_FAULTS: Final[Mapping[str, str]] = {"platform.wifi": "WEAK"}
 ORIENTATION_FAULTS: Final[Mapping[str, str]] = {"orientation.tilt": "TILTED"}
@@ -107,11 +108,20 @@ def with_faults(found: Judgement, faults: Iterable[Fault], words: Mapping[str, s
         faults: of the robot.
         words: for those of the part, by their ids.
     """
-    own = (
-        Judgement(FAULT_STYLES[fault.severity], words[fault.id])
-        for fault in faults
-        if fault.active and fault.id in words
-    )
+    return no_better(found, ((fault.id, fault.severity) for fault in faults if fault.active), words)
+
+
+def no_better(
+    found: Judgement, active: Iterable[tuple[str, FaultSeverity]], words: Mapping[str, str]
+) -> Judgement:
+    """Returns the judgement of a part, no better than the active faults that are its own.
+
+    Args:
+        found: by its values.
+        active: faults of the robot, by their ids.
+        words: for those of the part.
+    """
+    own = (Judgement(FAULT_STYLES[severity], words[each]) for each, severity in active if each in words)
     return worst((found, *own))
 
 

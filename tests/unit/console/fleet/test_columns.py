@@ -65,6 +65,16 @@ def test_low_values_are_marked_by_a_word() -> None:
     assert COLUMN["disk"].cell(row_of(message)) == Cell("99 %, FULL", SeverityStyle.BAD)
 
 
+def test_a_part_is_at_least_as_bad_as_its_own_fault() -> None:
+    """By limits of the robot's own: both values are good by the usual ones."""
+    message = healthy_state("a")
+    message.battery_percent, message.disk_used_percent = 60, 40
+    message.faults.add(fault_id="battery.low", severity=fault_pb2.FAULT_SEVERITY_WARNING)
+    message.faults.add(fault_id="platform.disk", severity=fault_pb2.FAULT_SEVERITY_ERROR)
+    assert COLUMN["battery"].cell(row_of(message)) == Cell("60 %, LOW", SeverityStyle.WARNING)
+    assert COLUMN["disk"].cell(row_of(message)) == Cell("40 %, FULL", SeverityStyle.BAD)
+
+
 def test_the_last_known_state_of_a_robot_that_is_away_is_quiet() -> None:
     message = healthy_state("a")
     message.battery_percent = 8
