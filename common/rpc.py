@@ -20,6 +20,9 @@ _SERVER_OPTIONS: Final = (
     # Requests are small: a larger one is rejected before it takes memory.
     ("grpc.max_receive_message_length", 256 * 1024),
     ("grpc.max_send_message_length", 4 * 1024 * 1024),
+    # Per connection (SETTINGS_MAX_CONCURRENT_STREAMS, RFC 9113 6.5.2): what one client can have handled at
+    # once, before those of others.
+    ("grpc.max_concurrent_streams", 256),
     # Calls of all connections that wait for a handler; gRPC cancels any more, of any caller. Each takes some
     # 20 KiB and 0.1 ms, so a long queue costs memory, and the others more time, than a short one saves calls.
     ("grpc.server.max_pending_requests", 1024),
@@ -38,7 +41,6 @@ _SERVER_OPTIONS: Final = (
     ("grpc.max_connection_idle_ms", 300_000),
 )
 _MAX_CONNECTIONS: Final = 1024
-_MAX_CALLS_OF_CONNECTION: Final = 256
 _MAX_CONCURRENT_CALLS: Final = 4096
 """Of all connections; more are refused with RESOURCE_EXHAUSTED. Beyond its own limit a connection's streams
 are reset by HTTP/2, which a flooding caller may see as UNAVAILABLE."""
@@ -62,7 +64,6 @@ def new_server(
     *,
     max_connections: int = _MAX_CONNECTIONS,
     max_calls: int = _MAX_CONCURRENT_CALLS,
-    max_calls_of_connection: int = _MAX_CALLS_OF_CONNECTION,
 ) -> grpc.aio.Server:
     """Returns a server that is neither bound nor started.
 
@@ -71,15 +72,10 @@ def new_server(
         max_connections: accepted at once at each of its addresses; any more are closed before TLS.
             No more than `possible_connections`.
         max_calls: served at once; any more are refused before the chain.
-        max_calls_of_connection: open at once, streams among them; a client keeps any more back.
     """
-    at_most = (
-        ("grpc.max_allowed_incoming_connections", possible_connections(max_connections)),
-        # SETTINGS_MAX_CONCURRENT_STREAMS, RFC 9113 6.5.2.
-        ("grpc.max_concurrent_streams", max_calls_of_connection),
-    )
+    at_most = ("grpc.max_allowed_incoming_connections", possible_connections(max_connections))
     return grpc.aio.server(
         interceptors=(chain or Chain([ErrorInterceptor()]),),
-        options=(*_SERVER_OPTIONS, *at_most),
+        options=(*_SERVER_OPTIONS, at_most),
         maximum_concurrent_rpcs=max_calls,
     )

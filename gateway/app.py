@@ -63,7 +63,6 @@ async def running(gateway: Gateway, extra: Sequence[grpc.GenericRpcHandler] = ()
                 gateway.interceptors,
                 gateway.health,
                 max_connections=gateway.max_connections,
-                max_streams=gateway.settings.limits.streams_per_connection,
                 credentials=gateway.access.server_credentials,
                 extra=extra,
             ) as port,

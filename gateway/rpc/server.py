@@ -40,10 +40,6 @@ from gateway.rpc.services.teleop import TeleopService
 _log = logging.getLogger(__name__)
 
 SERVICE: Final = CONTRACT.full_name
-CALLS_BESIDE_STREAMS: Final = 80
-"""Other calls than streams that a connection may have open. Ten callers that open all of theirs do not fill
-gRPC's queue, beyond which it cancels calls of anyone (common/rpc.py); and enough of them wait that their
-connections are known to flood (interceptors/turns.py)."""
 _MAX_CALLS: Final = 2 * MAX_OPEN
 """That gRPC serves at once: stops find room beyond MAX_OPEN, and those that are refused there end at once."""
 
@@ -135,7 +131,6 @@ async def serving(
     health: Health,
     *,
     max_connections: int,
-    max_streams: int,
     credentials: grpc.ServerCredentials | None = None,
     extra: Sequence[grpc.GenericRpcHandler] = (),
 ) -> AsyncIterator[int]:
@@ -147,7 +142,6 @@ async def serving(
         interceptors: what every call passes.
         health: answers the health service.
         max_connections: accepted at once.
-        max_streams: that a connection may have open at once; besides them CALLS_BESIDE_STREAMS others.
         credentials: for TLS; None for plaintext.
         extra: further services.
 
@@ -162,7 +156,6 @@ async def serving(
         chain,
         max_connections=max_connections,
         max_calls=_MAX_CALLS,
-        max_calls_of_connection=max_streams + CALLS_BESIDE_STREAMS,
     )
     methods = services.methods()
     handlers = [

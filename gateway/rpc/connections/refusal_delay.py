@@ -14,7 +14,7 @@ REFUSAL_DELAY_S: Final = 0.5
 REFUSAL_SPACING_S: Final = 0.005
 """Minimum spacing of delayed refusals, over all connections."""
 _MAX_DELAYED: Final = 512
-"""Refusals that are delayed at once, the last of them for 3.1 s, each of some 25 KiB: all that five
+"""Refusals that are delayed at once, the last of them for 3.1 s, each of some 25 KiB: all that two
 connections can have open. Any more leave at once, and their connection's calls wait from
 then on (`Admission.note_excess`)."""
 _LONGEST_DELAY_S: Final = REFUSAL_DELAY_S + _MAX_DELAYED * REFUSAL_SPACING_S

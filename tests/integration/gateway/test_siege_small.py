@@ -8,10 +8,8 @@ from bench.siege.ground import own_ground
 from bench.siege.judgement import REVOCATION_S
 from bench.siege.rounds import Outcome, besiege
 from bench.siege.size import SMALL
-from gateway.config import LimitSettings
 from gateway.rpc.connections.admission import MAX_PENDING
 from gateway.rpc.connections.shedding import BURST
-from gateway.rpc.server import CALLS_BESIDE_STREAMS
 
 pytestmark = [pytest.mark.timed, pytest.mark.alone]
 
@@ -20,7 +18,7 @@ CONNECTION_KIB = 64
 to 53 here, with what those cost that are cut off and come back."""
 CALL_KIB = 25
 """What a call costs whose refusal is delayed (gateway/rpc/connections/refusal_delay.py)."""
-CALLS = LimitSettings().streams_per_connection + CALLS_BESIDE_STREAMS
+CALLS = 256
 """That a connection may have open."""
 
 
