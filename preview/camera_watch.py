@@ -8,12 +8,12 @@ look that still hangs then is waited for again, and no other begins beside it.
 
 import asyncio
 import logging
+import time
 from collections.abc import Iterable
 from functools import partial
 from typing import Final, NoReturn
 
-from common.errors import UserError
-from preview.config import PreviewSettings
+from preview.config import PreviewSettings, RosSource
 from preview.pipeline import sources
 from preview.pipeline.threads import SharedCall
 from preview.supervisor import Supervisor
@@ -22,6 +22,10 @@ _log = logging.getLogger(__name__)
 
 LOOK_EVERY_S: Final = 2.0
 LOOK_DEADLINE_S: Final = 1.0
+TAP_ANSWERS_S: Final = 0.3
+"""For all topics together: a camera tap that hangs must not cost the look at the other cameras its deadline.
+It answers from what it knows; where it does not, it is busy, and a start finds out.
+"""
 PAUSE_AFTER_HANG_S: Final = 60.0
 
 
@@ -46,13 +50,13 @@ async def watch_cameras(supervisor: Supervisor, settings: PreviewSettings) -> No
 
 
 def problems(settings: PreviewSettings, cameras: Iterable[str]) -> dict[str, str]:
-    """Returns why cameras can't be used, by name; empty for those that can be, as far as is known."""
-    found = {}
-    for camera in cameras:
-        try:
-            sources.examine_camera(settings, camera)
-        except UserError as error:
-            found[camera] = str(error)
-        else:
-            found[camera] = ""
-    return found
+    """Returns why cameras can't be used, by name; empty for those that can be, as far as is known.
+
+    Those of which nothing is known, because the camera tap does not answer, are left out.
+    """
+    sources_by_name = settings.named_sources
+    # Topics first: the time for their answers must not go by at a slow file.
+    in_turn = sorted(cameras, key=lambda camera: not isinstance(sources_by_name[camera], RosSource))
+    until_s = time.monotonic() + TAP_ANSWERS_S
+    found = {camera: sources.camera_problem(settings, camera, until_s) for camera in in_turn}
+    return {camera: problem for camera, problem in found.items() if problem is not None}

@@ -87,24 +87,27 @@ def plan_camera(settings: PreviewSettings, camera: str) -> SourcePlan:
     return replace(planned, label=label, silence_s=source.silence_s)
 
 
-def examine_camera(settings: PreviewSettings, camera: str) -> None:
-    """Finds out whether a camera can be used, without opening it.
+def camera_problem(settings: PreviewSettings, camera: str, until_s: float) -> str | None:
+    """Returns why a camera can't be used, for people; empty if it can, as far as is known without opening it.
 
     More than a plan does: a start waits some time for a topic that is about to be published.
 
     Args:
         settings: of the service.
         camera: its name.
-
-    Raises:
-        UserError: the camera can't be used, as far as is known.
+        until_s: when the camera tap's answer is due, on `time.monotonic()`; None is returned without one.
     """
-    plan_camera(settings, camera)
+    try:
+        plan_camera(settings, camera)
+    except UserError as error:
+        return str(error)
     source = settings.named_sources[camera]
-    if isinstance(source, RosSource):
-        problem = tap_client.topic_problem(settings.camera_tap.socket, source.topic)
-        if problem:
-            raise UserError(f"camera {camera}: {problem}" if settings.cameras else problem, _REMEDY_TOPIC)
+    if not isinstance(source, RosSource):
+        return ""
+    problem = tap_client.topic_problem(settings.camera_tap.socket, source.topic, until_s)
+    if not problem:
+        return problem
+    return str(UserError(f"camera {camera}: {problem}" if settings.cameras else problem, _REMEDY_TOPIC))
 
 
 def _plan(settings: PreviewSettings, camera: str, key: str, source: AnyKind) -> SourcePlan:

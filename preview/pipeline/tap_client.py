@@ -12,6 +12,7 @@ import errno
 import fcntl
 import os
 import socket
+import time
 from array import array
 from collections.abc import Sequence
 from contextlib import closing
@@ -33,8 +34,6 @@ from common.camera_tap import (
 )
 
 CONNECT_S: Final = 2.0
-_ANSWER_S: Final = 0.5
-"""The tap answers from what it knows; one that does not is busy, and a start finds out."""
 _INT_BYTES: Final = array("i").itemsize
 
 
@@ -164,20 +163,33 @@ def connection_problem(path: Path) -> str:
     return ""
 
 
-def topic_problem(path: Path, topic: str) -> str:
-    """Returns why a topic can't be shown, for people; empty if it can, or if the tap does not say in time."""
+def topic_problem(path: Path, topic: str, until_s: float) -> str | None:
+    """Returns why a topic can't be shown, for people; empty if it can, None if the tap does not say in time.
+
+    Args:
+        path: of the tap's socket.
+        topic: its name.
+        until_s: when the answer is due, on `time.monotonic()`.
+    """
+    left_s = until_s - time.monotonic()
+    if left_s <= 0:
+        return None
     try:
-        with closing(_connected(path, _ANSWER_S)) as connection:
+        with closing(_connected(path, 0.0)) as connection:
+            connection.settimeout(left_s)
             connection.send(encode_examine(topic))
             packet = connection.recv(MAX_PACKET_BYTES)
-        header, content = decode(packet) if packet else (None, b"")
+        if not packet:
+            return None
+        header, content = decode(packet)
     except TapError as error:
         return f"the camera tap can't be asked for {topic}: {error}"
     except MalformedPacketError as error:
         return f"the camera tap sent {error}"
     except OSError:  # Among them that nothing has come in time.
-        return ""
-    return decode_text(content) if header and header.kind is Kind.PROBLEM else ""
+        return None
+    # An older tap sends its state: all that can be known of it is that it runs.
+    return decode_text(content) if header.kind is Kind.PROBLEM else ""
 
 
 def _connected(path: Path, timeout_s: float) -> socket.socket:

@@ -185,8 +185,11 @@ def test_it_says_whether_a_topic_is_published_as_images(tap: RunningTap) -> None
     with talking() as talker:
         talker.publisher("/words", Marker)
 
+        def answer(topic: str) -> str | None:
+            return topic_problem(tap.socket, topic, time.monotonic() + PATIENCE_S)
+
         def says(topic: str, problem: str) -> None:
-            wait_until(lambda: topic_problem(tap.socket, topic) == problem, f"{topic}: {problem}", PATIENCE_S)
+            wait_until(lambda: answer(topic) == problem, f"{topic}: {problem}", PATIENCE_S)
 
         says("/nothing", "nothing publishes /nothing")
         says("/words", f"/words is published as std_msgs/msg/Header, not as {' or '.join(READERS)}")

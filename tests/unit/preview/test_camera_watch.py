@@ -1,15 +1,18 @@
 """Looking which cameras are there goes on, whatever a look ends with."""
 
 import asyncio
+import socket
 import threading
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from preview import camera_watch
-from preview.camera_watch import LOOK_EVERY_S, PAUSE_AFTER_HANG_S, watch_cameras
-from preview.config import PreviewSettings
+from preview.camera_watch import LOOK_EVERY_S, PAUSE_AFTER_HANG_S, problems, watch_cameras
+from preview.config import CameraTapSettings, PreviewSettings, RosSource, TestSource
+from preview.pipeline import sources
 from preview.pipeline.threads import SharedCall
 from tests.support.virtual_time import in_virtual_time
 
@@ -84,3 +87,46 @@ async def test_a_look_that_hangs_is_the_only_one(monkeypatch: pytest.MonkeyPatch
     finally:
         answers.set()
         watching.cancel()
+
+
+def test_a_tap_that_hangs_is_waited_for_once_and_says_nothing_of_its_topics(tmp_path: Path) -> None:
+    """Other cameras are looked at all the same; these stay as they are."""
+    path, requests = tmp_path / "tap", list[bytes]()
+    settings = PreviewSettings(
+        cameras={
+            "arm": RosSource(topic="/arm/image_raw"),
+            "rear": RosSource(topic="/rear/image_raw"),
+            "front": TestSource(),
+        },
+        camera_tap=CameraTapSettings(socket=path),
+    )
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as tap:
+        tap.bind(str(path))
+        tap.listen()
+        found = problems(settings, settings.named_sources)
+        tap.settimeout(0)
+        for _ in range(2 * len(settings.cameras)):
+            try:
+                connection, _ = tap.accept()
+            except BlockingIOError:
+                break
+            with connection:
+                requests.append(connection.recv(1000))
+    assert found == {"front": ""}
+    assert sum(map(bool, requests)) <= 1, "topics share the time for answers"
+    assert camera_watch.TAP_ANSWERS_S <= camera_watch.LOOK_DEADLINE_S / 2, "the rest is for the others"
+
+
+def test_that_time_does_not_go_by_at_a_slow_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    looked_at = list[str]()
+
+    def look(_settings: PreviewSettings, camera: str, _until_s: float) -> str:
+        looked_at.append(camera)
+        return ""
+
+    monkeypatch.setattr(sources, "camera_problem", look)
+    settings = PreviewSettings(
+        cameras={"film": TestSource(), "arm": RosSource(topic="/arm"), "rear": RosSource(topic="/rear")}
+    )
+    problems(settings, settings.named_sources)
+    assert looked_at == ["arm", "rear", "film"]
