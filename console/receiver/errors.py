@@ -30,6 +30,10 @@ class NoPictureError(StreamError):
     """Packets arrive, but no whole picture, over one connection after the other."""
 
 
+class ReceiverFailedError(StreamError):
+    """A defect of the receiver itself, which may recur with the next connection."""
+
+
 class UndecodableError(StreamError):
     """The stream arrives, but this computer can't decode it."""
 
@@ -94,9 +98,9 @@ def ended(address: StreamAddress, reason: str = "") -> StreamEndedError:
     )
 
 
-def receiver_failed(error: Exception) -> StreamError:
+def receiver_failed(error: Exception) -> ReceiverFailedError:
     """Returns the error of a defect of the receiver itself."""
-    return StreamError(
+    return ReceiverFailedError(
         f"the receiver itself failed: {error!r}",
         "Another one takes its place; the terminal has the details for a report",
     )

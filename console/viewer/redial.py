@@ -23,9 +23,10 @@ def redial_backoff() -> Backoff:
 
 
 def no_picture_backoff() -> Backoff:
-    """Returns the pauses after connections over which packets came, but no picture; reset in the same way.
+    """Returns the pauses after connections that came about in vain; reset in the same way.
 
-    They are longer: each connection begins with a key frame, which costs all viewers.
+    Packets came over them, but no picture, or the receiver failed itself. They are longer: each connection
+    begins with a key frame, which costs all viewers.
     """
     return Backoff(first_s=1.0, longest_s=5.0)
 

@@ -14,6 +14,7 @@ from console.receiver.address import StreamAddress
 from console.receiver.delivery import Delivery, DeliveryChoice
 from console.receiver.errors import (
     NoPictureError,
+    ReceiverFailedError,
     StreamError,
     UndecodableError,
     hung_too_often,
@@ -224,7 +225,7 @@ class VideoSession:
             self._update(redials=self._inputs.redials + 1)
 
     def _pause_after(self, error: UserError) -> float:
-        in_vain = isinstance(error, NoPictureError)
+        in_vain = isinstance(error, NoPictureError | ReceiverFailedError)
         return (self._no_picture_backoff if in_vain else self._backoff).next_s()
 
     def _reset_backoff(self) -> None:

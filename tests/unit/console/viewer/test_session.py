@@ -11,7 +11,7 @@ from console.client import Unreachable
 from console.client.results import PreviewState
 from console.receiver.address import StreamAddress
 from console.receiver.delivery import Delivery, DeliveryChoice
-from console.receiver.errors import UndecodableError, ended, from_srt, no_picture
+from console.receiver.errors import UndecodableError, ended, from_srt, no_picture, receiver_failed
 from console.receiver.frame import Frame
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.options import ReceiverOptions
@@ -278,9 +278,9 @@ def test_a_connection_that_is_made_anew_by_itself_is_not_silent(
     called(exchange, 2)
 
 
-def test_a_stream_of_which_too_little_comes_says_what_to_do_and_is_called_ever_less_often(
-    session: VideoSession, exchange: Exchange, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def pauses_s(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """The pauses so far; none is made."""
     pauses_s = list[float]()
     original = Backoff.next_s
 
@@ -289,6 +289,12 @@ def test_a_stream_of_which_too_little_comes_says_what_to_do_and_is_called_ever_l
         return 0.0
 
     monkeypatch.setattr(Backoff, "next_s", next_s)
+    return pauses_s
+
+
+def test_a_stream_of_which_too_little_comes_says_what_to_do_and_is_called_ever_less_often(
+    session: VideoSession, exchange: Exchange, pauses_s: list[float]
+) -> None:
     session.follow(preview(PreviewState.RUNNING))
     for number in range(1, 6):
         called(exchange, number)
@@ -306,6 +312,18 @@ def test_a_stream_of_which_too_little_comes_says_what_to_do_and_is_called_ever_l
     exchange.calls[-1][1].end(no_picture(address, 5.0))
     called(exchange, 7)
     assert pauses_s[5:] == [1.0], "a picture begins it anew"
+
+
+def test_after_a_defect_of_the_receiver_it_is_called_as_seldom(
+    session: VideoSession, exchange: Exchange, pauses_s: list[float]
+) -> None:
+    """One that recurs costs all viewers a key frame each time."""
+    session.follow(preview(PreviewState.RUNNING))
+    for number in range(1, 6):
+        called(exchange, number)
+        exchange.calls[-1][1].end(receiver_failed(OverflowError("-1 does not fit")))
+    called(exchange, 6)
+    assert pauses_s == [1.0, 2.0, 4.0, 5.0, 5.0]
 
 
 def test_a_frame_of_before_a_suspend_is_frozen_for_as_long(
