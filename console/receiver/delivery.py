@@ -37,7 +37,7 @@ class Delivery:
     Args:
         kind: DIRECT or SRT.
         reason: why it is not direct, although that was not ruled out.
-        remedy: what to type so that it is; empty without a reason.
+        remedy: what to do, or to type, so that it is; empty without a reason.
         rtt_ms: round trip, smoothed; None before the first connection.
         lost: packets that were missing at first.
         loss_percent: share of the packets of the last second that were missing at first; None before one.

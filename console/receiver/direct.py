@@ -13,6 +13,7 @@ from console.receiver.errors import (
     StreamError,
     from_srt,
     no_picture,
+    no_socket,
     receiver_failed,
     undecodable,
     unresolved,
@@ -113,7 +114,7 @@ class DirectConnection:
                     return
                 self._take_packets(connection)
         except LocalSocketError as error:
-            raise StreamError(f"no stream from {address.uri}: {error}", error.remedy) from error
+            raise no_socket(address, str(error), error.remedy) from error
         except (SrtError, OSError) as error:
             reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
             raise from_srt(address, reason, had_data=self._had_data) from error

@@ -72,6 +72,11 @@ def unresolved(address: StreamAddress, error: OSError) -> StreamError:
     )
 
 
+def no_socket(address: StreamAddress, why: str, remedy: str) -> StreamError:
+    """Returns the error of a computer that gives no socket, so that nothing was sent."""
+    return StreamError(f"no stream from {address.uri}: {why}", remedy)
+
+
 def hung(within_s: float) -> StreamError:
     """Returns the error of a connection that can't be closed, as with a driver that hangs."""
     return StreamError(

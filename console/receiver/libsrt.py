@@ -32,7 +32,12 @@ _CONNECTING: Final = 4
 _CONNECTED: Final = 5
 _EPOLL_IN: Final = 1
 _ERROR: Final = -1
-_TOO_MANY_FILES: Final = (errno.EMFILE, errno.ENFILE)
+REMEDY_TOO_MANY_FILES: Final = "Type: ulimit -n 4096, and start this program again"
+_REMEDIES_EXHAUSTED: Final = {
+    errno.EMFILE: REMEDY_TOO_MANY_FILES,
+    # The limit of all programs together: raising that of this one does not help.
+    errno.ENFILE: "End programs with many open files, or raise the limit that this shows: sysctl fs.file-max",
+}
 _REJ_UNKNOWN: Final = 0
 """SRT_REJ_UNKNOWN: no reason is known."""
 
@@ -41,24 +46,37 @@ class DirectImpossibleError(Exception):
     """This computer permits no direct delivery; the text says why.
 
     Attributes:
-        remedy: what to type.
+        remedy: what to do, or to type.
     """
 
-    remedy = "Type: sudo apt-get install libsrt1.5-gnutls"
+    remedy: str
 
 
 class LibsrtMissingError(DirectImpossibleError):
     """No usable libsrt."""
 
+    remedy = "Type: sudo apt-get install libsrt1.5-gnutls"
+
 
 class LocalSocketError(DirectImpossibleError):
-    """No socket can be had, before anything was sent."""
+    """No socket can be had, before anything was sent.
+
+    Args:
+        cause: the error of the system, or of libsrt.
+
+    Attributes:
+        exhausted: whether there are too many open files, which leaves none for any other delivery either.
+    """
+
+    remedy = "Check that this program may open UDP sockets: a policy may forbid it, or IPv6 be switched off"
 
     def __init__(self, cause: Exception) -> None:
         why = cause.strerror if isinstance(cause, OSError) else None
         super().__init__(f"libsrt gets no socket: {why or cause}")
-        if isinstance(cause, OSError) and cause.errno in _TOO_MANY_FILES:
-            self.remedy = "Type: ulimit -n 4096, and start this program again"
+        number = cause.errno if isinstance(cause, OSError) else None
+        self.exhausted = number in _REMEDIES_EXHAUSTED
+        if number in _REMEDIES_EXHAUSTED:
+            self.remedy = _REMEDIES_EXHAUSTED[number]
 
 
 class SrtError(Exception):

@@ -13,9 +13,10 @@ from console.name_lookup import resolve
 from console.receiver.address import StreamAddress
 from console.receiver.decoding import CODECS, DecodingBranch, element
 from console.receiver.delivery import Delivery, DeliveryChoice
-from console.receiver.errors import UndecodableError, ended, from_srt, undecodable
+from console.receiver.errors import UndecodableError, ended, from_srt, no_socket, undecodable
 from console.receiver.file_branch import add_file_branch
 from console.receiver.frame_queue import FrameQueue
+from console.receiver.libsrt import REMEDY_TOO_MANY_FILES, DirectImpossibleError, LocalSocketError
 from console.receiver.options import CLOSES_WITHIN_S, ReceiverOptions
 
 _STOP = "stop"
@@ -34,8 +35,7 @@ class SrtConnection:
         address: SRT listener to connect to.
         queue: takes the frames and the end of the stream.
         options: pixel format, decoders and recording.
-        reason: why delivery is not direct; empty if it is not meant to be.
-        remedy: what to type so that it is.
+        impossible: why delivery is not direct; None if it is not meant to be.
 
     Raises:
         UserError: a GStreamer element is not installed.
@@ -46,10 +46,14 @@ class SrtConnection:
         address: StreamAddress,
         queue: FrameQueue,
         options: ReceiverOptions,
-        reason: str = "",
-        remedy: str = "",
+        impossible: DirectImpossibleError | None = None,
     ) -> None:
-        self.delivery = Delivery(kind=DeliveryChoice.SRT, reason=reason, remedy=remedy)
+        self._impossible = impossible
+        self.delivery = Delivery(
+            kind=DeliveryChoice.SRT,
+            reason=str(impossible) if impossible else "",
+            remedy=impossible.remedy if impossible else "",
+        )
         """The delivery in use."""
         self.received_s: float | None = None
         """Of direct delivery alone it is known when a frame was received."""
@@ -154,7 +158,11 @@ class SrtConnection:
         while True:
             message = bus.timed_pop_filtered(Gst.CLOCK_TIME_NONE, kinds)
             if message is None:
-                continue
+                # A bus that got no descriptor can't wait, and has lost what was posted.
+                self._queue.end(
+                    no_socket(self._address, "GStreamer gets no descriptor", REMEDY_TOO_MANY_FILES)
+                )
+                return
             if message.type == Gst.MessageType.ERROR:
                 self._on_error(message)
             elif message.type == Gst.MessageType.EOS:
@@ -166,10 +174,16 @@ class SrtConnection:
 
     def _on_error(self, message: Any) -> None:
         error, detail = message.parse_error()
+        why = self._impossible
         if any(branch.owns(message.src) for branch in self._branches.values()) or error.matches(
             GLib.quark_from_string("gst-stream-error-quark"), Gst.StreamError.DECODE
         ):
             self._queue.end(undecodable(self._address, error.message))
+        elif isinstance(why, LocalSocketError) and error.matches(
+            GLib.quark_from_string("gst-resource-error-quark"), Gst.ResourceError.OPEN_READ
+        ):
+            # The source has sent nothing either: the robot is not to blame.
+            self._queue.end(no_socket(self._address, str(why), why.remedy))
         else:
             self._queue.end(from_srt(self._address, detail or error.message, had_data=self._had_data))
 

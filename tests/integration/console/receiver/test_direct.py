@@ -1,7 +1,9 @@
 """Direct delivery with the real libsrt: GStreamer's srtsink sends, a relay delays and loses."""
 
 import errno
+import os
 import random
+import resource
 import socket
 import struct
 import threading
@@ -16,7 +18,7 @@ import pytest
 from common.errors import UserError
 from common.gst import Gst, stop
 from console.capture_time import WRAP_TICKS, CaptureClock, ticks_to_ns
-from console.receiver import libsrt, reception
+from console.receiver import decoding, libsrt, reception
 from console.receiver.address import StreamAddress
 from console.receiver.connection import connect
 from console.receiver.delivery import Delivery, DeliveryChoice
@@ -58,6 +60,8 @@ STEADY_FROM = 30
 FIRST_PTS_NS = 3600 * 10**9
 """mpegtsmux begins an hour ahead."""
 AFTERWARDS = 15
+NO_ADDRESS_OF_OURS = "203.0.113.1"
+"""For documentation (RFC 5737)."""
 NO_FRAME = bytes([0x47, 0x1F, 0xFF, 0x10]) + bytes(184)
 """A null packet (ISO/IEC 13818-1 2.4.3.3): the stream goes on without a frame."""
 
@@ -532,19 +536,32 @@ def test_without_libsrt_the_srt_latency_applies_and_the_reason_is_given(
         )
 
 
-@pytest.fixture(params=["descriptors", "srt_setsockopt", "srt_bind_acquire"])
+@contextmanager
+def no_descriptors() -> Iterator[None]:
+    """This process gets no further file descriptor."""
+    before, highest = resource.getrlimit(resource.RLIMIT_NOFILE)
+    lowest_free = os.dup(0)
+    os.close(lowest_free)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (lowest_free, highest))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (before, highest))
+
+
+@pytest.fixture(params=[errno.EACCES, "srt_setsockopt", "srt_bind_acquire"])
 def no_socket(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
     """From its call on no socket can be had on this computer, for one of the reasons."""
     library, make = libsrt.load(), socket.socket
 
-    def exhausted(family: int = -1, kind: int = -1, *more: Any, **others: Any) -> socket.socket:
+    def refused(family: int = -1, kind: int = -1, *more: Any, **others: Any) -> socket.socket:
         if kind == socket.SOCK_DGRAM:
-            raise OSError(errno.EMFILE, "Too many open files")
+            raise OSError(request.param, os.strerror(request.param))
         return make(family, kind, *more, **others)
 
     def deny() -> None:
-        if request.param == "descriptors":
-            monkeypatch.setattr("console.receiver.libsrt.socket.socket", exhausted)
+        if isinstance(request.param, int):
+            monkeypatch.setattr("console.receiver.libsrt.socket.socket", refused)
         else:
             monkeypatch.setattr(library, request.param, lambda *_: -1)
 
@@ -563,13 +580,65 @@ def test_without_a_socket_for_libsrt_the_srt_latency_applies_and_the_reason_is_g
         delivery = viewer.delivery
         assert delivery.kind is DeliveryChoice.SRT
         assert "libsrt gets no socket: " in delivery.reason
-        assert delivery.remedy.startswith("Type: ulimit -n" if "files" in delivery.reason else "Type: sudo")
+        assert "may open UDP sockets" in delivery.remedy
     with pytest.raises(UserError, match="direct delivery is not possible: libsrt gets no socket"):
         receiver(port, delivery=DeliveryChoice.DIRECT)
 
 
-def test_sockets_that_run_out_later_are_not_taken_for_a_silent_robot(
+def test_without_descriptors_there_is_no_other_delivery(port: int) -> None:
+    """The defect: GStreamer's source, which needs more of them, said that no SRT listener answers."""
+    libsrt.load()
+    with no_descriptors(), pytest.raises(StreamError, match="libsrt gets no socket: Too many open") as caught:
+        receiver(port)
+    assert caught.value.remedy.startswith("Type: ulimit -n")
+
+
+def test_a_pipeline_without_descriptors_ends_the_stream(port: int) -> None:
+    """The defect: its bus, which can't wait without one, was asked again without end."""
+    with SrtSender(port), receiver(port, delivery=DeliveryChoice.SRT):
+        pass  # GStreamer has loaded what it needs.
+    with ExitStack() as stack:
+        with no_descriptors():
+            viewer = stack.enter_context(receiver(port, delivery=DeliveryChoice.SRT))
+        with pytest.raises(StreamError, match=f"no stream from srt://127.0.0.1:{port}: GStreamer gets no"):
+            viewer.next_frame(PATIENCE_S)
+
+
+def test_a_fallback_without_a_socket_does_not_blame_the_robot(
     port: int, no_socket: Callable[[], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    local_port = free_udp_port()
+
+    def element(kind: str, **properties: Any) -> Any:
+        made = decoding.element(kind, **properties)
+        if kind == "srtsrc":
+            made.set_property("localaddress", NO_ADDRESS_OF_OURS)
+            made.set_property("localport", local_port)
+        return made
+
+    no_socket()
+    monkeypatch.setattr("console.receiver.srt.element", element)
+    with (
+        SrtSender(port),
+        receiver(port) as viewer,
+        pytest.raises(StreamError, match=r"no stream from srt://\S+: libsrt gets no socket: ") as caught,
+    ):
+        viewer.next_frame(PATIENCE_S)
+    assert "may open UDP sockets" in caught.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("no_socket", "remedy"),
+    [
+        (errno.EMFILE, "Type: ulimit -n"),
+        (errno.EACCES, "Check that"),
+        ("srt_setsockopt", "Check that"),
+        ("srt_bind_acquire", "Check that"),
+    ],
+    indirect=["no_socket"],
+)
+def test_sockets_that_run_out_later_are_not_taken_for_a_silent_robot(
+    port: int, no_socket: Callable[[], None], remedy: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As when the connection is made anew: the next one, of the session, has another delivery."""
     connect_to_it = DirectConnection._resolved
@@ -585,7 +654,7 @@ def test_sockets_that_run_out_later_are_not_taken_for_a_silent_robot(
         pytest.raises(StreamError, match="libsrt gets no socket: ") as caught,
     ):
         viewer.next_frame(PATIENCE_S)
-    assert caught.value.remedy.startswith("Type: ")
+    assert caught.value.remedy.startswith(remedy)
 
 
 def test_direct_alone_is_an_error_without_libsrt(port: int, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,13 +2,15 @@
 
 import atexit
 import ctypes
+import errno
+import os
 from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 from console.receiver import libsrt
-from console.receiver.libsrt import LibsrtMissingError
+from console.receiver.libsrt import LibsrtMissingError, LocalSocketError
 
 pytestmark = pytest.mark.gst
 
@@ -97,3 +99,20 @@ def test_the_next_name_is_tried_where_one_does_not_open(
 
     assert load(monkeypatch, only_the_last) is library
     assert at_exit == [library.srt_cleanup]
+
+
+@pytest.mark.parametrize(
+    ("number", "exhausted", "remedy"),
+    [
+        (errno.EMFILE, True, "Type: ulimit -n"),
+        (errno.ENFILE, True, "fs.file-max"),
+        (errno.EACCES, False, "may open UDP sockets"),
+        (errno.EAFNOSUPPORT, False, "IPv6"),
+    ],
+)
+def test_each_reason_for_no_socket_has_its_remedy(*, number: int, exhausted: bool, remedy: str) -> None:
+    error = LocalSocketError(OSError(number, os.strerror(number)))
+    assert str(error) == f"libsrt gets no socket: {os.strerror(number)}"
+    assert error.exhausted is exhausted
+    assert remedy in error.remedy
+    assert "apt-get" not in error.remedy
