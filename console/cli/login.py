@@ -3,8 +3,8 @@
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Final, TypeVar
@@ -15,6 +15,7 @@ from common.backoff import Backoff
 from common.errors import ExitCode, UserError
 from common.reasons import Reason
 from console.cli.options import JsonOption, json_requested
+from console.cli.piped_login import HasLoginError, PipedLogin
 from console.cli.session import print_json, standard_output
 from console.client import Credentials, GatewayClient, NotAllowed
 from console.robots import read_credentials, read_robots_file
@@ -29,10 +30,6 @@ STANDARD_INPUT = "-"
 _FIRST_PAUSE_S: Final = 0.25
 _LONGEST_PAUSE_S: Final = 1.0
 _RETRIES: Final = 3
-
-
-class _HasLoginError(UserError):
-    """The robot of this name has a login already."""
 
 
 def login(
@@ -55,13 +52,16 @@ def login(
 
     On one line: ssh HOST robot-gateway credentials add NAME --role operator | robotctl login ROBOT HOST:PORT
     """
-    piped = login_text(file) if not ca and file == STANDARD_INPUT and not sys.stdin.isatty() else None
-    with _accounting_for(piped):
+    piped = PipedLogin.of(sys.stdin) if not ca and file == STANDARD_INPUT else None
+    with piped.accounted_for() if piped else nullcontext():
         check_name(name)
         target = parse_target(target)
         if not (replacing or ca):
             _check_free(name)
-        user, credentials = _with_new_authority(name, ca) if ca else _read(piped or login_text(file))
+        text = "" if ca else login_text(file)
+        if piped:
+            piped.text = text
+        user, credentials = _with_new_authority(name, ca) if ca else _read(text)
         gateway_name = ""
         if not offline:
             with GatewayClient(target, credentials=credentials) as gateway:
@@ -99,43 +99,10 @@ def once_known(ask: Callable[[], AnswerT], sleep: Callable[[float], None] = time
         sleep(pauses.next_s())
 
 
-@contextmanager
-def _accounting_for(piped: str | None) -> Iterator[None]:
-    """Adds to an error what becomes of the login in a pipe: the robot has issued it, and nothing else has it.
-
-    Args:
-        piped: What the pipe contained; None without one.
-
-    Raises:
-        UserError: The one that was raised inside.
-    """
-    try:
-        yield
-    except UserError as error:
-        issued = _issued_in(piped)
-        if issued:
-            taken = isinstance(error, _HasLoginError)
-            cause = f"{error.remedy}. " if error.remedy and not taken else ""
-            error.what += "; the login in the pipe is not stored, but stays valid"
-            error.remedy = (
-                f"{cause}Type on the robot: robot-gateway credentials revoke {issued}; "
-                f"then repeat the whole pipe{', with --replace at its end' if taken else ''}"
-            )
-        raise
-
-
-def _issued_in(piped: str | None) -> str:
-    """Returns what revokes the login in a pipe; empty where it contained none."""
-    try:
-        return parse_login(piped or "").revoked_by
-    except UserError:
-        return ""
-
-
 def _check_free(name: str) -> None:
     known = read_robots_file().robots.get(name)
     if known and any(getattr(known, key) for key in FILE_KEYS):
-        raise _HasLoginError(
+        raise HasLoginError(
             f"'{name}' has a login already, at {known.target}",
             f"Type: {shlex.join(['robotctl', *sys.argv[1:], '--replace'])}",
             exit_code=ExitCode.USAGE,

@@ -1,7 +1,7 @@
 """`robot-gateway credentials` and `robotctl login` as people type them, and what must be in no log."""
 
-import io
 import json
+import os
 import re
 import shlex
 import subprocess
@@ -78,6 +78,16 @@ def running(ground: Path) -> Iterator[Path]:
 
 def operator(ground: Path, *words: str) -> "subprocess.CompletedProcess[str]":
     return robotctl(*words, XDG_CONFIG_HOME=str(ground / "config"))
+
+
+@contextmanager
+def piped(text: str) -> Iterator[None]:
+    """Standard input is a pipe that brings a text."""
+    ours, theirs = os.pipe()
+    with os.fdopen(theirs, "w", encoding="utf-8") as end:
+        end.write(text)
+    with os.fdopen(ours, encoding="utf-8") as stdin, mock.patch.object(sys, "stdin", stdin):
+        yield
 
 
 def guess(ground: Path, target: str, login: str) -> None:
@@ -174,7 +184,7 @@ def test_a_login_from_a_pipe_is_accepted_every_time(ground: Path) -> None:
     with running(ground):
         for number in range(9):
             login = credentials(ground, "add", f"person-{number}", "--role", "viewer")
-            with mock.patch.object(sys, "stdin", io.StringIO(login)):
+            with piped(login):
                 done = operator(ground, "login", f"lab{number}", f"127.0.0.1:{port_of(ground)}")
             assert done.returncode == 0, done.stderr
         for number in (0, 8):
@@ -203,7 +213,7 @@ def test_a_login_in_a_pipe_over_another_one_is_not_lost_unnoticed(ground: Path) 
     with running(ground):
         for number in (1, 2):
             issued = credentials(ground, "add", "anna", "--role", "viewer")
-            with mock.patch.object(sys, "stdin", io.StringIO(issued)):
+            with piped(issued):
                 done = operator(ground, *words)
             assert done.returncode == (0 if number == 1 else 2)
         said = only_line(done.stderr)
@@ -219,7 +229,7 @@ def test_a_login_in_a_pipe_over_another_one_is_not_lost_unnoticed(ground: Path) 
 
 def assert_the_piped_login_can_be_revoked(ground: Path, robot: str, host: str, says: str) -> None:
     issued = credentials(ground, "add", "anna", "--role", "viewer")
-    with mock.patch.object(sys, "stdin", io.StringIO(issued)):
+    with piped(issued):
         done = operator(ground, "login", robot, f"{host}:{port_of(ground)}")
     assert done.returncode != 0
     said = only_line(done.stderr)
