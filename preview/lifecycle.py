@@ -61,7 +61,7 @@ class Listening(Enum):
     NO = "no"
     YES = "yes"
     FAILED = "failed"
-    """Its listener has failed, while the pipeline goes on for a recording; a retry is scheduled."""
+    """Its listener has failed, while the pipeline goes on; a retry is scheduled."""
 
 
 _D, _S, _R, _X, _F = State.DISABLED, State.STARTING, State.RUNNING, State.STOPPING, State.FAULTED

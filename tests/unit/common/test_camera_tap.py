@@ -100,5 +100,5 @@ def test_the_state_is_asked_for_by_name() -> None:
 
 
 def test_an_older_tap_takes_the_question_for_a_topic_for_one_for_its_state() -> None:
-    """It disconnects, with a warning in its log, whoever sends what it does not know."""
+    """It disconnects a client that sends what it does not know, and logs a warning."""
     assert json.loads(encode_examine("/image")).items() >= json.loads(STATUS_REQUEST).items()

@@ -745,7 +745,7 @@ def test_a_stream_whose_pts_wraps_goes_on_with_true_capture_times(port: int, pie
     undisturbed(attempt)
 
 
-def test_time_stamps_that_run_backwards_for_ever_harm_nobody(port: int, pieces: list[bytes]) -> None:
+def test_time_stamps_that_run_backwards_for_ever_do_no_harm(port: int, pieces: list[bytes]) -> None:
     """Each frame's is half a wrap from that of the frame before."""
     half, hour_ticks = WRAP_TICKS // 2, 3600 * 90_000
     with SrtSender(port) as sender, receiver(port, max_age_s=1e6) as viewer:
