@@ -105,7 +105,7 @@ class DirectConnection:
         """Receives over one connection until it is to be made anew, or closed."""
         address = self._address
         host = self._resolved()
-        shown, unit_s = self._queue.put_so_far, self._decoder.newest_s
+        before_s, unit_s = self._queue.newest_s, self._decoder.newest_s
         try:
             connection = SrtSocket(host, address.port, address.latency_ms, address.passphrase)
             with closing(connection):
@@ -119,13 +119,14 @@ class DirectConnection:
             reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
             raise from_srt(address, reason, had_data=self._had_data) from error
 
-        self._pace(shown=self._queue.put_so_far > shown, undecoded=self._decoder.newest_s != unit_s)
+        shown_s = self._queue.newest_s
+        self._pace(shown_s if shown_s != before_s else None, undecoded=self._decoder.newest_s != unit_s)
 
-    def _pace(self, *, shown: bool, undecoded: bool) -> None:
+    def _pace(self, shown_s: float | None, *, undecoded: bool) -> None:
         """Waits until the next connection is due, or raises why there is none."""
         now_s = time.monotonic()
-        pause_s = self._rejoins.pause_s(now_s, shown=shown)
-        self._undecoded = not shown and (undecoded or self._undecoded)
+        pause_s = self._rejoins.pause_s(now_s, shown_s)
+        self._undecoded = shown_s is None and (undecoded or self._undecoded)
         if pause_s is not None:
             self._stopping.wait(pause_s)
         elif self._undecoded:

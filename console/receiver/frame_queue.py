@@ -19,14 +19,14 @@ class FrameQueue:
         self._frames: deque[Frame] = deque(maxlen=size)
         self._end: StreamError | None = None
         self._changed = threading.Condition()
-        self.put_so_far = 0
-        """Frames that were put so far."""
+        self.newest_s: float | None = None
+        """When the newest frame came, on `time.monotonic()`; None before the first."""
 
     def put(self, frame: Frame) -> None:
         """Appends the newest frame."""
         with self._changed:
             self._frames.append(frame)
-            self.put_so_far += 1
+            self.newest_s = frame.arrival_s
             self._changed.notify_all()
 
     def end(self, error: StreamError) -> None:

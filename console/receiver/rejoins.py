@@ -22,20 +22,21 @@ class Rejoins:
 
     def __init__(self, now_s: float) -> None:
         self._shown_s = now_s
+        """When the newest picture came, at first when the first connection was begun."""
         self._in_vain = 0
         self._backoff = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S)
 
-    def pause_s(self, now_s: float, *, shown: bool) -> float | None:
+    def pause_s(self, now_s: float, shown_s: float | None) -> float | None:
         """Returns the pause before the next connection; None: there should be no further one.
 
         After a picture, and once without, there is no pause.
 
         Args:
             now_s: when the connection ended.
-            shown: whether it has brought a picture.
+            shown_s: when its newest picture came; None if it has brought none.
         """
-        if shown:
-            self._shown_s, self._in_vain = now_s, 0
+        if shown_s is not None:
+            self._shown_s, self._in_vain = shown_s, 0
             self._backoff.reset()
             return 0.0
         self._in_vain += 1
