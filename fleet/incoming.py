@@ -11,7 +11,7 @@ connection each time, and keeps every header, of which a message may have half a
 | headers larger than 4 KiB, of another version, or with a status that is no number | no headers; counted |
 | other headers than those below | they are not kept |
 | headers of a sender that look like the hub's | the hub's own are behind them, and count (`read_place`) |
-| a status in the name of the hub, of another client | see `consuming.py`: only answers have one |
+| a status in the name of the hub, of another client | none: `Message.status`, and `consuming.py` |
 """
 
 import re

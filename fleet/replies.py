@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from fleet.errors import HubError, HubReason, api_error
-from fleet.incoming import STATUS
+from fleet.incoming import SEQUENCE, STATUS
 
 MAX_WAITING: Final = 8 * 1024 * 1024
 """Bytes that may wait in one subscription, or for one caller."""
@@ -30,8 +30,11 @@ class Message:
 
     @property
     def status(self) -> str:
-        """JetStream's status code of a message without content, as "404"; empty for an ordinary one."""
-        return self.headers.get(STATUS, "")
+        """JetStream's status code of a message without content, as "404"; empty for an ordinary one.
+
+        One that is stored in a stream has none: what its headers begin with is its sender's.
+        """
+        return "" if SEQUENCE in self.headers else self.headers.get(STATUS, "")
 
     @property
     def size(self) -> int:

@@ -5,6 +5,7 @@ from contextlib import asynccontextmanager
 
 from fleet import names
 from fleet.connection import FleetAddress, Hub, connect
+from fleet.replies import parsed
 from fleet.session import Session
 
 _CONNECT_S = 10.0
@@ -28,6 +29,18 @@ async def thiefs_session(address: FleetAddress) -> AsyncGenerator[Session, None]
         yield session
     finally:
         await session.close()
+
+
+async def store_with_status(session: Session, subject: str, status: str) -> None:
+    """Stores a message whose headers begin as an answer of the hub does; its payload is its subject."""
+    name, headers = subject.encode(), f"NATS/1.0 {status}\r\n\r\n".encode()
+    with session.waiter(subject) as (waiter, reply):
+        sizes = b"%d %d" % (len(headers), len(headers) + len(name))
+        await session._client._send_command(
+            b"HPUB %s %s %s\r\n%s%s\r\n" % (name, reply.encode(), sizes, headers, name)
+        )
+        await session._client._flush_pending()
+        assert "seq" in parsed((await waiter.get(_CONNECT_S)).payload)
 
 
 async def put_marks(administrator: Hub) -> None:

@@ -15,7 +15,7 @@ from fleet.clock import read_clock
 from fleet.connection import FleetAddress, Published, Start
 from fleet.errors import HubError, HubReason, RefusedError
 from fleet.serving import Request
-from tests.support.attacked_hub import connected, everything, put_marks, thiefs_session
+from tests.support.attacked_hub import connected, everything, put_marks, store_with_status, thiefs_session
 from tests.support.nats_servers import DEBIAN_SERVER, SERVER
 from tests.support.secure_hub import SecureHub, secure_hub
 
@@ -254,6 +254,36 @@ async def test_headers_of_a_robot_change_nothing_of_what_people_read(
             if len(read) == len(subjects):
                 break
     assert read == [(subject, subject) for subject in subjects]
+
+
+async def test_a_status_of_a_robot_is_read_as_no_answer_of_the_hub(
+    hub: SecureHub, logins: dict[str, FleetAddress]
+) -> None:
+    """The defect: everyone's list of the fleet, events and exporter failed at one message until a purge."""
+    statuses = ("503", "404", "204", "408 Request Timeout")
+    subjects = [f"fleet.a.ev.status.{number}" for number in range(len(statuses))]
+    sequences = []
+    async with (
+        thiefs_session(hub.address(hub.path / "a" / "bridge.creds", names.inbox_prefix("a"))) as thief,
+        connected(logins["reader"]) as reader,
+    ):
+        for subject, status in zip(subjects, statuses, strict=True):
+            await store_with_status(thief, subject, status)
+            newest = await reader.last(names.EVENTS, subject)
+            assert newest is not None
+            assert newest.payload == subject.encode()
+            sequences.append(newest.sequence)
+            await store_with_status(thief, f"$KV.{names.STATES}.a", status)
+            assert "a" in await reader.entries(names.STATES)
+            assert "a" in await reader.entries(names.STATES, "a")
+        # Each of them as the first one of an answer, the last one alone in it.
+        for first, sequence in enumerate(sequences):
+            read = []
+            async for message in reader.follow(names.EVENTS, "fleet.a.ev.>", Start.after(sequence - 1)):
+                read.append(message.payload.decode())
+                if len(read) == len(subjects) - first:
+                    break
+            assert read == subjects[first:]
 
 
 def _consumer(stream: str, **more: str) -> bytes:

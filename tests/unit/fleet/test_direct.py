@@ -67,6 +67,13 @@ async def test_the_next_request_is_for_what_did_not_come() -> None:
     assert await _read(Saying([cut, [_status("404")], [_message(4)]]), 3) == [1, 2, 4]
 
 
+@pytest.mark.parametrize("status", ["503", "404", "204", "408"])
+async def test_a_status_of_the_sender_is_none_of_the_hubs(status: str) -> None:
+    """The defect: 503 had the request sent again, and its answers were mixed with those of the first."""
+    first, second = _message(1, more={"Status": status}), _message(2, 1, 0)
+    assert await _read(Saying([[first, second, _status("204")]]), 2) == [1, 2]
+
+
 @pytest.mark.parametrize(
     ("said", "reason"),
     [
