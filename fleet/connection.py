@@ -25,11 +25,12 @@ from typing import Any, Final
 from common.backoff import Backoff
 from common.broadcast import Broadcast
 from common.tasks import cancel
-from fleet import consuming, direct, names
+from fleet import consuming, direct
 from fleet.consuming import Delivery
 from fleet.direct import Start, StoredMessage
 from fleet.errors import HubError, HubReason, RefusedError, UnreachableError, api_error, is_repeat
 from fleet.incoming import OPERATION
+from fleet.present import present
 from fleet.replies import NO_RESPONDERS, Message, NotTaken, parsed
 from fleet.serving import Handler, Service, serve_in
 from fleet.session import Session
@@ -201,11 +202,11 @@ class Hub:
             timeout_s: for each answer of the hub.
 
         Raises:
-            HubError: it can't be read; TOO_MANY: it has more than is read at once (`direct.present`).
+            HubError: it can't be read; TOO_MANY: it has more than is read at once (fleet/present.py).
         """
         found: dict[str, Entry] = {}
-        present = direct.present(self._open(), f"KV_{bucket}", f"$KV.{bucket}.{keys}", timeout_s)
-        async with aclosing(present) as messages:
+        present_ones = present(self._open(), f"KV_{bucket}", f"$KV.{bucket}.{keys}", timeout_s)
+        async with aclosing(present_ones) as messages:
             async for message in messages:
                 entry = _entry(bucket, message)
                 # What changes while it is read comes once more.
@@ -355,13 +356,7 @@ class Hub:
         Raises:
             HubError: with JetStream's code.
         """
-        try:
-            return await self._open().api(names.info_subject(stream), None, timeout_s)
-        except HubError as error:
-            if error.reason is not HubReason.NO_RESPONDERS:
-                raise
-        # The name is that of people's accounts. Where the streams are, the call has its own.
-        return await self.api(f"STREAM.INFO.{stream}", None, timeout_s)
+        return await direct.stream_info(self._open(), stream, None, timeout_s)
 
     async def consumer_info(self, subject: str, timeout_s: float = REQUEST_TIMEOUT_S) -> dict[str, Any]:
         """Requests JetStream's ConsumerInfo by a subject that the account has it under.

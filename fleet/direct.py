@@ -21,15 +21,12 @@ from datetime import datetime
 from typing import Any, Final, Self
 
 from common.backoff import Backoff
+from fleet import names
 from fleet.errors import HubError, HubReason
 from fleet.incoming import DESCRIPTION, PENDING, PREVIOUS, SEQUENCE, STORED_AS, TAKEN
 from fleet.replies import NO_RESPONDERS, Message
 from fleet.session import Session
 
-MOST_PRESENT: Final = 100_000
-"""Messages that are read at once (`present`): ten times the robots that a console shows."""
-MOST_PRESENT_BYTES: Final = 256 * 1024 * 1024
-"""Bytes of their contents: they are all in memory, and a hub could send without end."""
 _BATCH: Final = 256
 """Messages requested at once."""
 _MAX_BYTES: Final = 2 * 1024 * 1024
@@ -106,7 +103,7 @@ async def follow(
     pause = Backoff(_FIRST_POLL_S, _LONGEST_POLL_S)
     while True:
         before = sequence
-        async with aclosing(_batch(session, stream, subjects, sequence, timeout_s)) as messages:
+        async with aclosing(batch(session, stream, subjects, sequence, timeout_s)) as messages:
             async for message in messages:
                 sequence = message.sequence + 1
                 yield message
@@ -116,28 +113,42 @@ async def follow(
             pause.reset()
 
 
-async def present(
-    session: Session, stream: str, subjects: str, timeout_s: float
-) -> AsyncGenerator[StoredMessage, None]:
-    """Yields the messages that are in a stream now, and ends.
+async def stream_info(session: Session, stream: str, request: Any, timeout_s: float) -> dict[str, Any]:
+    """Returns JetStream's StreamInfo of a stream.
+
+    Args:
+        session: with the hub.
+        stream: its name.
+        request: what of it, beyond the least (None).
+        timeout_s: for each answer of the hub.
 
     Raises:
-        HubError: it can't be read; TOO_MANY: there are more than MOST_PRESENT, or MOST_PRESENT_BYTES.
+        HubError: with JetStream's code.
     """
-    sequence, count, size = 1, 0, 0
-    while True:
-        pending: int | None = 0
-        async with aclosing(_batch(session, stream, subjects, sequence, timeout_s)) as messages:
-            async for message in messages:
-                sequence, pending = message.sequence + 1, message.pending
-                count, size = count + 1, size + len(message.payload)
-                if count + (pending or 0) > MOST_PRESENT:
-                    raise _too_many(f"{stream} has more than the {MOST_PRESENT} messages that")
-                if size > MOST_PRESENT_BYTES:
-                    raise _too_many(f"{stream} has more than the {MOST_PRESENT_BYTES} bytes that")
-                yield message
-        if pending == 0:
-            return
+    try:
+        return await session.api(names.info_subject(stream), request, timeout_s)
+    except HubError as error:
+        if error.reason is not HubReason.NO_RESPONDERS:
+            raise
+    # The name is that of people's accounts. Where the streams are, the call has its own.
+    return await session.api(f"$JS.API.STREAM.INFO.{stream}", request, timeout_s)
+
+
+async def batch(
+    session: Session, stream: str, subjects: str, sequence: int, timeout_s: float
+) -> AsyncGenerator[StoredMessage, None]:
+    """Yields the next messages of a stream from a sequence on; none if there are none yet.
+
+    Raises:
+        HubError: the hub does not answer, or with what does not follow one another.
+    """
+    request = {"seq": sequence, "next_by_subj": subjects, "batch": _BATCH, "max_bytes": _MAX_BYTES}
+    async with aclosing(_answers(session, stream, request, timeout_s)) as messages:
+        async for message in messages:
+            if message.sequence < sequence:
+                raise HubError(HubReason.INVALID, f"the hub repeats messages of {stream}")
+            sequence = message.sequence + 1
+            yield message
 
 
 async def last(session: Session, stream: str, subjects: str, timeout_s: float) -> StoredMessage | None:
@@ -176,23 +187,6 @@ async def _one(
 ) -> StoredMessage | None:
     async with aclosing(_answers(session, stream, request, timeout_s)) as messages:
         return await anext(messages, None)
-
-
-async def _batch(
-    session: Session, stream: str, subjects: str, sequence: int, timeout_s: float
-) -> AsyncGenerator[StoredMessage, None]:
-    """Yields the next messages from a sequence on; none if there are none yet.
-
-    Raises:
-        HubError: the hub does not answer, or with what does not follow one another.
-    """
-    request = {"seq": sequence, "next_by_subj": subjects, "batch": _BATCH, "max_bytes": _MAX_BYTES}
-    async with aclosing(_answers(session, stream, request, timeout_s)) as messages:
-        async for message in messages:
-            if message.sequence < sequence:
-                raise HubError(HubReason.INVALID, f"the hub repeats messages of {stream}")
-            sequence = message.sequence + 1
-            yield message
 
 
 async def _answers(
@@ -268,7 +262,3 @@ def _number(message: Message, header: str) -> int:
     # More digits than are converted at all are a ValueError, too.
     except ValueError as error:
         raise HubError(HubReason.INVALID, "a message has no place in its stream") from error
-
-
-def _too_many(text: str) -> HubError:
-    return HubError(HubReason.TOO_MANY, f"{text} are read at once")
