@@ -13,7 +13,7 @@
 import asyncio
 import json
 import time
-from collections.abc import AsyncGenerator, Sequence
+from collections.abc import AsyncGenerator, Callable, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -36,29 +36,36 @@ _ELECTED_WITHIN_S: Final = 15.0
 """A cluster that lost a server has a leader again by then (docs/fleet.md)."""
 
 
-def move_people(directory: HubDirectory) -> tuple[User, ...]:
+def move_people(directory: HubDirectory, name: Callable[[User], None]) -> None:
     """Gives a hub of an earlier version accounts of people's own, and ends the credentials for the other one.
 
     Those have rights in the account of the streams, by which their owners could delete what is in it. Servers
     learn of it from `apply`.
 
-    Returns:
-        People and receivers that need new credentials; none if nothing was missing.
+    Args:
+        directory: the hub's.
+        name: takes each person and receiver that needs new credentials, before the last step: where this is
+            interrupted, the next attempt names them again.
 
     Raises:
         UserError: the directory is not a hub's, or can't be written.
     """
     with directory.locked():
-        record = directory.read()
-        if not directory.missing_accounts():
-            return ()
-        moved = tuple(each for each in record.users if each.kind != "robot" and each.revoked is None)
+        record, missing = directory.read(), directory.missing_accounts()
+        people = [each for each in record.users if each.kind != "robot" and each.revoked is None]
+        if missing:
+            for user in people:
+                record = _with_revoked(record, user.keys)
+            # First: were it interrupted, it would be repeated as long as there are no keys.
+            directory.write(record)
+            add_accounts(directory)
+        # A key in use that is revoked is of one who has been moved and may not have been named.
+        moved = [each for each in people if each.keys[-1] in record.revoked]
         for user in moved:
-            record = _with_revoked(record.with_user(replace(user, revoked=_now_s())), user.keys)
-        # First: were it interrupted, it would be repeated as long as there are no keys.
-        directory.write(record)
-        add_accounts(directory)
-    return moved
+            name(user)
+            record = record.with_user(replace(user, revoked=_now_s()))
+        if moved:
+            directory.write(record)
 
 
 async def apply(directory: HubDirectory, limits: streams.StreamLimits | None = None) -> list[str]:

@@ -90,12 +90,8 @@ def apply(
     """
     limits = StreamLimits(events_mib * _MIB, events_days)
     hub = HubDirectory(directory)
-    for user in administration.move_people(hub):
-        # Before the servers are asked: an attempt that fails would not say it again.
-        typer.echo(
-            f"{user.name}: the credentials of this {user.kind} end now. Those of earlier versions could"
-            f" delete what the hub has. For new ones type:  {_again(user, hub)}"
-        )
+    # Before the servers are asked: an attempt that fails would not say it again.
+    administration.move_people(hub, lambda user: typer.echo(_moved(user, hub)))
     differences = _run(administration.apply(hub, limits))
     _refresh_nodes(hub)
     for difference in differences:
@@ -345,6 +341,14 @@ def _run(work: Coroutine[Any, Any, ResultT]) -> ResultT:
         }
         code = ExitCode.UNREACHABLE if error.reason is HubReason.UNREACHABLE else ExitCode.FAILED
         raise UserError(str(error), remedies.get(error.reason, "Try again"), exit_code=code) from error
+
+
+def _moved(user: User, hub: HubDirectory) -> str:
+    """Returns what a person or receiver of an earlier version needs to know."""
+    return (
+        f"{user.name}: the credentials of this {user.kind} end now. Those of earlier versions could"
+        f" delete what the hub has. For new ones type:  {_again(user, hub)}"
+    )
 
 
 def _again(user: User, hub: HubDirectory) -> str:
