@@ -233,10 +233,10 @@ class Database:
         with self._use() as db:
             db.execute("INSERT OR REPLACE INTO uploads VALUES (?, ?)", (recording_id, row))
 
-    def delete_upload(self, recording_id: str) -> None:
-        """Deletes the row of an upload, if there is one."""
+    def delete_uploads(self, recording_ids: Sequence[str]) -> None:
+        """Deletes the rows of uploads, as far as there are any; no more than 64, which is one transaction."""
         with self._use() as db:
-            db.execute("DELETE FROM uploads WHERE recording_id = ?", (recording_id,))
+            db.executemany("DELETE FROM uploads WHERE recording_id = ?", [(each,) for each in recording_ids])
 
     @contextmanager
     def _use(self) -> Iterator[sqlite3.Connection]:

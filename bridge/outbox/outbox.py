@@ -92,9 +92,9 @@ class Outbox:
         """Writes an upload's row."""
         await self._call(self._database.put_upload, recording_id, row)
 
-    async def delete_upload_row(self, recording_id: str) -> None:
-        """Deletes an upload's row."""
-        await self._call(self._database.delete_upload, recording_id)
+    async def delete_upload_rows(self, recording_ids: Sequence[str]) -> None:
+        """Deletes uploads' rows; see `Database.delete_uploads`."""
+        await self._call(self._database.delete_uploads, recording_ids)
 
     async def close(self) -> None:
         """Closes the database and ends the thread."""

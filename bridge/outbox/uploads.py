@@ -2,6 +2,7 @@
 
 import json
 import logging
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any, Final
 
@@ -14,6 +15,8 @@ _log = logging.getLogger(__name__)
 
 _ROW_BYTES: Final = 1024
 """Of a row on the disk: 400 with a short label, up to 1200 with the longest one."""
+_DELETED_AT_ONCE: Final = 64
+"""Rows in one transaction: each may change a page of its own."""
 
 
 def most_kept(max_bytes: int) -> int:
@@ -55,10 +58,11 @@ class StoredUploads:
         except OutboxError as error:
             raise OSError(str(error)) from error
 
-    async def delete_upload(self, recording_id: str) -> None:
-        """Deletes a row; raises as `uploads`."""
+    async def delete_uploads(self, recording_ids: Sequence[str]) -> None:
+        """Deletes rows, some at a time; raises as `uploads`."""
         try:
-            await self._outbox.delete_upload_row(recording_id)
+            for first in range(0, len(recording_ids), _DELETED_AT_ONCE):
+                await self._outbox.delete_upload_rows(recording_ids[first : first + _DELETED_AT_ONCE])
         except OutboxError as error:
             raise OSError(str(error)) from error
 

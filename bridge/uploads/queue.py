@@ -9,7 +9,7 @@ equals the oldest recording first, because it is what the robot deletes first. A
 the place of one that is being uploaded, which costs at most one part.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 from types import MappingProxyType
@@ -204,8 +204,8 @@ class UploadStore(Protocol):
             OSError: The disk can't be written.
         """
 
-    async def delete_upload(self, recording_id: str) -> None:
-        """Deletes a row, if it is there.
+    async def delete_uploads(self, recording_ids: Sequence[str]) -> None:
+        """Deletes rows, as far as they are there; where it fails, some may be left.
 
         Raises:
             OSError: The disk can't be written.

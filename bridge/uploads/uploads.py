@@ -18,7 +18,7 @@ import asyncio
 import logging
 import random
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Final
@@ -320,6 +320,8 @@ class Uploads:
                 self.unconfirmed.changed(upload.recording_id)
             self.disk_error = ""
             self._load_due_s = float("inf")
+            # Fewer than before may be remembered, where the outbox was made smaller, or counts as such now.
+            await self._trim()
         self.loaded.set()
 
     async def _next_tick(self) -> None:
@@ -411,7 +413,7 @@ class Uploads:
         try:
             await task
         except GoneError:
-            await self._forget(recording_id)
+            await self._forget([recording_id])
         except CutError as error:
             self.cuts += 1
             self._path_due_s = self._now_s + self._path.next_s()
@@ -487,7 +489,7 @@ class Uploads:
         """
         while self._room < 0 and (last := last_to_run(self._uploads.values())):
             self._left_out.add(last.recording_id)
-            await self._forget(last.recording_id)
+            await self._forget([last.recording_id])
 
     async def _apply(self, recording_id: str, event: Event, reason: str = "") -> None:
         """Changes an upload; not one that was cancelled, or has gone, while another row was written."""
@@ -498,19 +500,28 @@ class Uploads:
     async def _keep(self, upload: Upload) -> None:
         """Takes an upload into the queue, and onto the disk."""
         self._put(upload)
+        # First: a full outbox has room for the row then.
+        await self._trim()
         try:
             await self._write(upload.recording_id)
-            # Two for one: fewer than before may be remembered, where the outbox was made smaller.
-            for _ in range(min(2, self._beyond_kept)):
-                if oldest := self._oldest_settled():
-                    await self._forget(oldest)
         except OSError as error:
             self._note_disk(error)
 
-    async def _forget(self, recording_id: str) -> None:
-        self._drop(recording_id)
+    async def _trim(self) -> None:
+        """Forgets the settled uploads beyond those that are remembered."""
+        if forgotten := self._beyond_kept():
+            await self._forget(forgotten)
+
+    async def _forget(self, recording_ids: Sequence[str]) -> None:
+        for each in recording_ids:
+            self._drop(each)
         try:
-            await self._write(recording_id)
+            async with self._disk:
+                # But those that were queued again, while another row was written.
+                await self._store.delete_uploads(
+                    [each for each in recording_ids if each not in self._uploads]
+                )
+            self.disk_error = ""
         except OSError as error:
             self._note_disk(error)
 
@@ -524,7 +535,7 @@ class Uploads:
             if upload := self._uploads.get(recording_id):
                 await self._store.put_upload(upload)
             else:
-                await self._store.delete_upload(recording_id)
+                await self._store.delete_uploads([recording_id])
         self.disk_error = ""
 
     def _drop(self, recording_id: str) -> None:
@@ -547,17 +558,16 @@ class Uploads:
         _log.error("%s", self.disk_error)
         self._changed()
 
-    @property
-    def _beyond_kept(self) -> int:
-        """How many more settled ones there are than are remembered; not positive if there are none."""
-        return sum(each.state not in WAITING for each in self._uploads.values()) - self._most_kept
+    def _beyond_kept(self) -> list[str]:
+        """Returns the settled uploads that are remembered no more.
 
-    def _oldest_settled(self) -> str | None:
-        """Returns the one to forget first: a rule queues no verified one again, which the recorder knows."""
-        for state in (State.VERIFIED, State.LOCAL):
-            if found := next((key for key, each in self._uploads.items() if each.state is state), None):
-                return found
-        return None
+        The oldest verified ones first: a rule queues none of them again, as the recorder knows them.
+        """
+        settled = [each for each in self._uploads.values() if each.state not in WAITING]
+        if (beyond := len(settled) - self._most_kept) <= 0:
+            return []
+        settled.sort(key=lambda each: each.state is State.LOCAL)
+        return [each.recording_id for each in settled[:beyond]]
 
     def _has_room_for(self, upload: Upload) -> bool:
         known = self._uploads.get(upload.recording_id)

@@ -2,7 +2,7 @@
 
 import asyncio
 import hashlib
-from collections.abc import AsyncGenerator, AsyncIterator, Callable
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -116,8 +116,9 @@ class Rows:
             raise OSError(28, "No space left on device")
         self.rows[upload.recording_id] = upload
 
-    async def delete_upload(self, recording_id: str) -> None:
-        self.rows.pop(recording_id, None)
+    async def delete_uploads(self, recording_ids: Sequence[str]) -> None:
+        for each in recording_ids:
+            self.rows.pop(each, None)
 
 
 def new_signer() -> ReceiptSigner:

@@ -350,7 +350,7 @@ def test_rows_of_uploads_are_kept(tmp_path: Path) -> None:
     database.put_upload("r1", "one")
     database.put_upload("r2", "two")
     database.put_upload("r1", "three")
-    database.delete_upload("r2")
+    database.delete_uploads(["r2"])
     database.close()
     again = opened(tmp_path)
     assert again.uploads() == ["three"]

@@ -36,7 +36,7 @@ async def test_rows_outlive_the_program(tmp_path: Path) -> None:
     async with outbox(tmp_path, 64 << 20) as kept:
         await StoredUploads(kept).put_upload(UPLOAD)
         await StoredUploads(kept).put_upload(replace(UPLOAD, recording_id="r2"))
-        await StoredUploads(kept).delete_upload("r2")
+        await StoredUploads(kept).delete_uploads(["r2"])
     async with outbox(tmp_path, 64 << 20) as kept:
         assert await StoredUploads(kept).uploads() == [replace(UPLOAD, due_s=0.0, since_s=None)]
 

@@ -176,18 +176,3 @@ async def test_what_was_asked_for_by_hand_is_so_again_after_it_had_no_place() ->
         upload = running.upload("rec-00")
         assert upload
         assert upload.priority is Priority.BY_HAND
-
-
-async def test_more_than_is_remembered_is_forgotten_the_oldest_verified_first() -> None:
-    robot, rows = robot_with(1), Rows()
-    states = {"cancelled": State.LOCAL, **{f"old-{number}": State.VERIFIED for number in range(4)}}
-    rows.rows = {name: Upload(recording_id=name, state=state) for name, state in states.items()}
-    async with running_uploads(
-        robot, HUB, "127.0.0.1:9", (), rows, most_kept=3, only_while_charging=True
-    ) as running:
-        await running.uploads.enqueue("rec-00")
-        # Cancelled, it is one more of them.
-        await running.uploads.cancel("rec-00")
-    assert [name for name, each in rows.rows.items() if each.state is State.LOCAL] == ["cancelled", "rec-00"]
-    assert "old-3" in rows.rows
-    assert "old-0" not in rows.rows
