@@ -26,6 +26,9 @@ class Unconfirmed:
     def __len__(self) -> int:
         return len(self._listings)
 
+    def __contains__(self, recording_id: str) -> bool:
+        return recording_id in self._listings
+
     def changed(self, recording_id: str) -> None:
         """Takes a copy that has changed."""
         self._listings[recording_id] = self._listing

@@ -64,6 +64,8 @@ _TICK_S: Final = 1.0
 """How often the gates are looked at."""
 OPENING_SPREAD_S: Final = 30.0
 """After the gates have opened where hours are set: those of a whole fleet may begin in the same second."""
+_MOST_UNCONFIRMED: Final = 256
+"""Uploads that are remembered beyond the others until the recorder knows them; run bundles it never does."""
 _RATE_TICKS: Final = 5
 """Over how many the rate is measured."""
 
@@ -561,13 +563,19 @@ class Uploads:
     def _beyond_kept(self) -> list[str]:
         """Returns the settled uploads that are remembered no more.
 
-        The oldest verified ones first: a rule queues none of them again, as the recorder knows them.
+        The oldest verified ones first: a rule queues none of them again, as the recorder knows them. One that
+        it may not know yet stays, so that it is reported: the recorder would go on sparing the recording, and
+        have it queued again.
         """
         settled = [each for each in self._uploads.values() if each.state not in WAITING]
         if (beyond := len(settled) - self._most_kept) <= 0:
             return []
-        settled.sort(key=lambda each: each.state is State.LOCAL)
-        return [each.recording_id for each in settled[:beyond]]
+        settled.sort(key=lambda each: (each.state is State.LOCAL, each.recording_id in self.unconfirmed))
+        return [
+            each.recording_id
+            for place, each in enumerate(settled[:beyond])
+            if place < beyond - _MOST_UNCONFIRMED or each.recording_id not in self.unconfirmed
+        ]
 
     def _has_room_for(self, upload: Upload) -> bool:
         known = self._uploads.get(upload.recording_id)

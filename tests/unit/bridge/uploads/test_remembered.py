@@ -4,12 +4,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from bridge.outbox.outbox import outbox
 from bridge.outbox.uploads import StoredUploads, _row, most_kept
+from bridge.uploading import QueuedUploads
+from bridge.uploads import uploads
 from bridge.uploads.queue import State, Upload
 from bridge.values import Event, Position
 from console.client.results import RecordingCopyState
-from tests.support.uploading import Robot, Rows, running_uploads
+from omniseer.gateway.v1.recording_pb2 import RECORDING_COPY_STATE_VERIFIED
+from tests.support.uploading import Robot, Rows, Running, running_uploads
 
 HUB: Any = None
 _SMALLEST = 8 << 20
@@ -83,3 +88,75 @@ async def test_a_full_outbox_forgets_before_it_remembers() -> None:
         await running.uploads.cancel("without-place")
         assert running.uploads.disk_error == ""
     assert rows.rows.keys() == {"b", "c", "without-place"}
+
+
+class _Copied:
+    """An attempt that succeeds at once."""
+
+    def __init__(self, *_: Any, **__: Any) -> None:
+        pass
+
+    async def run(self) -> None:
+        pass
+
+
+def copying(robot: Robot, rows: Rows, most_kept: int) -> Any:
+    """Uploads that the rule queues, one after the other."""
+    return running_uploads(robot, HUB, "127.0.0.1:9", (), rows, most_kept=most_kept, rule="all")
+
+
+def known(robot: Robot, name: str, state: RecordingCopyState) -> None:
+    """The recorder has a copy in this state."""
+    recording = robot.recordings[name]
+    robot.recordings[name] = replace(recording, copy=replace(recording.copy, state=state))
+
+
+async def listed(running: Running, robot: Robot) -> None:
+    """The recorder's list is read."""
+    running.uploads.begin_listing()
+    await running.uploads.consider(list(robot.recordings.values()))
+    running.uploads.end_listing()
+
+
+async def test_a_copy_is_remembered_until_the_recorder_knows_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The defect: beside as many cancelled ones it was forgotten at once, and queued with each list again."""
+    monkeypatch.setattr(uploads, "Attempt", _Copied)
+    rows = rows_with(a=State.LOCAL, b=State.LOCAL, c=State.LOCAL)
+    robot = robot_with("a", "b", "c", "new")
+    for name in ("a", "b", "c"):
+        known(robot, name, RecordingCopyState.UNKNOWN)
+    known(robot, "new", RecordingCopyState.QUEUED)
+    async with copying(robot, rows, most_kept=3) as running:
+        await listed(running, robot)
+        await running.until("new", lambda each: each and each.state is State.VERIFIED)
+        for _ in range(2):
+            await listed(running, robot)
+            assert running.uploads.waiting == []
+            reports = QueuedUploads(running.uploads).copies()
+            states = {each.recording_id: each.copy.state for each in reports}
+            assert states["new"] == RECORDING_COPY_STATE_VERIFIED
+        # Once the recorder knows it, it is the first to be forgotten.
+        known(robot, "new", RecordingCopyState.VERIFIED)
+        await listed(running, robot)
+        robot.add("next", {"data.bin": b"x"})
+        known(robot, "next", RecordingCopyState.UNKNOWN)
+        await listed(running, robot)
+        await running.until("next", lambda each: each and each.state is State.VERIFIED)
+        assert running.uploads.get("new") is None
+        await listed(running, robot)
+        assert running.uploads.waiting == []
+    assert rows.rows.keys() == {"a", "b", "c", "next"}
+
+
+async def test_of_copies_that_the_recorder_never_knows_not_all_are_remembered(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Those of run bundles, of which it keeps no state."""
+    monkeypatch.setattr(uploads, "Attempt", _Copied)
+    monkeypatch.setattr(uploads, "_MOST_UNCONFIRMED", 2)
+    robot = robot_with(*(f"run-{number}" for number in range(6)))
+    async with copying(robot, Rows(), most_kept=3) as running:
+        for number in range(6):
+            await running.uploads.enqueue(f"run-{number}")
+            await running.until(f"run-{number}", lambda each: each and each.state is State.VERIFIED)
+        assert {each.recording_id for each in running.uploads.settled} == {f"run-{n}" for n in range(1, 6)}
