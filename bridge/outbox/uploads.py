@@ -71,6 +71,9 @@ def _row(upload: Upload) -> str:
     values: dict[str, Any] = asdict(upload)
     # Of this run alone.
     del values["due_s"], values["since_s"], values["cuts"]
+    if not upload.bundle:
+        # An earlier version does not understand it, to which the robot may go back.
+        del values["bundle"]
     values |= {
         "priority": upload.priority.name,
         "state": upload.state.name,

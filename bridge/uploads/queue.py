@@ -165,6 +165,8 @@ class Upload:
         cuts: CUT events in succession, without progress; not kept over a restart.
         due_s: When a failed one is tried again; monotonic seconds, and so not kept over a restart.
         since_s: Since when it has its state; None where that was before the start. As `due_s`.
+        bundle: Whether it is a run bundle, of which the recorder keeps no state: that its copy was requested
+            is known here alone.
     """
 
     recording_id: str
@@ -180,6 +182,7 @@ class Upload:
     cuts: int = 0
     due_s: float = 0.0
     since_s: float | None = None
+    bundle: bool = False
 
     @property
     def order(self) -> tuple[Priority, int, str]:
@@ -286,6 +289,14 @@ def in_order(uploads: Iterable[Upload]) -> list[Upload]:
 
 
 def last_to_run(uploads: Iterable[Upload]) -> Upload | None:
-    """Returns the last in order of those that wait and do not run; None if there is none."""
-    waiting = (each for each in uploads if each.state in WAITING - RUNNING)
+    """Returns the last in order of those that may lose their places; None if there is none.
+
+    Those wait, do not run, and would be queued again: by the rule, or as the recorder knows that they were
+    requested.
+    """
+    waiting = (
+        each
+        for each in uploads
+        if each.state in WAITING - RUNNING and not (each.bundle and each.priority is Priority.BY_HAND)
+    )
     return max(waiting, key=lambda each: each.order, default=None)

@@ -10,6 +10,7 @@
 | they fail three times at one recording, without progress | as a failure of that one: others go on |
 | the recording is deleted on the robot | it leaves the queue |
 | the queue is full | a more urgent recording takes the last one's place, which competes for one again |
+| that is a run bundle, requested by hand | it keeps its place, as nothing else knows of the request |
 | the bridge's disk fails | the queue goes on in memory; `disk_error` says why; a new request is refused |
 | the queue on the disk is lost | what the recorder expects to be copied is queued again |
 """
@@ -608,6 +609,7 @@ def _new(recording: results.Recording, lowest: Priority = Priority.OTHER) -> Upl
         priority=priority,
         started_unix_ms=recording.started_unix_ms,
         size=recording.size,
+        bundle=recording.kind is results.RecordingKind.RUN_BUNDLE,
     )
 
 

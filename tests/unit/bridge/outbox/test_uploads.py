@@ -41,6 +41,14 @@ async def test_rows_outlive_the_program(tmp_path: Path) -> None:
         assert await StoredUploads(kept).uploads() == [replace(UPLOAD, due_s=0.0, since_s=None)]
 
 
+async def test_what_an_earlier_version_does_not_know_is_in_few_rows(tmp_path: Path) -> None:
+    async with outbox(tmp_path, 64 << 20) as kept:
+        for upload in (UPLOAD, replace(UPLOAD, recording_id="run-1", bundle=True)):
+            await StoredUploads(kept).put_upload(upload)
+        assert ["bundle" in row for row in await kept.upload_rows()] == [False, True]
+        assert [each.bundle for each in await StoredUploads(kept).uploads()] == [False, True]
+
+
 @pytest.mark.parametrize("row", ["", "{}", "[]", '{"state": "QUEUED"}', '{"priority": 1}'])
 async def test_a_row_that_is_none_is_left_out(tmp_path: Path, row: str) -> None:
     async with outbox(tmp_path, 64 << 20) as kept:

@@ -128,6 +128,41 @@ async def test_a_request_by_hand_goes_before_what_the_rule_has_queued_and_not_be
         assert set(waiting(running)) == by_hand
 
 
+async def test_a_run_bundle_that_was_requested_by_hand_keeps_its_place() -> None:
+    """The defect: it was lost. The recorder keeps no state of it, and so does not expect its copy."""
+    robot, rows = Robot(), Rows()
+    for number in range(PLACES - 1):
+        add(robot, f"rec-{number}", number)
+    add(robot, "run-2", 99, RecordingKind.RUN_BUNDLE)
+    async with closed(robot, rows, "incidents") as running:
+        for name in robot.recordings:
+            await running.uploads.enqueue(name)
+    async with closed(robot, rows, "incidents") as running:
+        for number in range(PLACES):
+            add(robot, f"incident-{number}", 50 + number, RecordingKind.INCIDENT)
+        await listed(running, robot)
+        assert waiting(running) == [*(f"incident-{number}" for number in range(PLACES - 1)), "run-2"]
+        assert running.uploads.left_out == PLACES - 1 + 1
+        # A further request by hand has no place before it, and learns of that.
+        add(robot, "rec-9", 1)
+        with pytest.raises(TooMuchError, match="5 recordings wait"):
+            await running.uploads.enqueue("rec-9")
+
+
+async def test_a_run_bundle_that_the_rule_has_queued_loses_its_place_and_gets_another_one() -> None:
+    robot = robot_with(PLACES - 1)
+    add(robot, "run-2", 99, RecordingKind.RUN_BUNDLE)
+    async with closed(robot) as running:
+        await listed(running, robot)
+        assert "run-2" in waiting(running)
+        add(robot, "incident", 100, RecordingKind.INCIDENT)
+        await listed(running, robot)
+        assert "run-2" not in waiting(running)
+        await running.uploads.cancel("rec-00")
+        await listed(running, robot)
+        assert "run-2" in waiting(running)
+
+
 async def test_one_without_a_place_can_be_cancelled() -> None:
     robot, rows = robot_with(PLACES + 1), Rows()
     expected(robot, "rec-05")
