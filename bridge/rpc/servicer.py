@@ -11,6 +11,7 @@ from bridge.commands.pending_requests import Pending, PendingRequests
 from bridge.connection_status import Status
 from bridge.uploading import Uploading
 from bridge.values import OutboxError
+from common.broadcast import HEARTBEAT_S
 from common.errors import InvalidRequestError, TooMuchError
 from common.reasons import Reason
 from fleet.connection import NotTaken
@@ -62,8 +63,8 @@ class BridgeServicer(pb_grpc.BridgeServiceServicer):
     async def WatchState(  # noqa: N802  # the schema names it
         self, _request: pb.WatchStateRequest, _context: grpc.aio.ServicerContext[Any, Any]
     ) -> AsyncIterator[pb.WatchStateResponse]:
-        """Streams the state, now, after changes and every second; a slow reader skips outdated ones."""
-        async for _ in self._status.changes.now_and_on_change():
+        """Streams the state now, after changes, at least every second; a slow reader skips outdated ones."""
+        async for _ in self._status.changes.now_and_on_change(lambda: HEARTBEAT_S - _LEAST_INTERVAL_S):
             yield self._state()
             # A queue of a thousand uploads that is made, or that a gate closes, changes as often.
             await asyncio.sleep(_LEAST_INTERVAL_S)

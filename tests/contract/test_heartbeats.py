@@ -9,9 +9,11 @@ from typing import Any, cast
 
 import pytest
 
-from common.broadcast import Broadcast
+from bridge.rpc.servicer import BridgeServicer
+from common.broadcast import HEARTBEAT_S, Broadcast
 from gateway.links.bridge.link import BridgeLink
 from gateway.links.watch import ServiceWatch
+from omniseer.bridge.v1 import bridge_service_pb2 as bridge_pb
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
 from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
 from preview.camera_planner import CameraPlanner
@@ -76,11 +78,16 @@ def test_an_idle_recorder(monkeypatch: pytest.MonkeyPatch) -> None:
     check()
 
 
-def test_an_idle_bridge() -> None:
+def test_an_idle_bridge(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(BridgeServicer, "_state", lambda _: bridge_pb.WatchStateResponse())
     silence_s = BridgeLink("bridge", cast("Any", None))._silence_s
 
     @in_virtual_time
     async def check() -> None:
-        assert await longest_gap_s(Broadcast().now_and_on_change()) * LATE_REPORTS < silence_s
+        servicer = BridgeServicer.__new__(BridgeServicer)
+        servicer._status = cast("Any", SimpleNamespace(changes=Broadcast()))
+        gap_s = await longest_gap_s(servicer.WatchState(bridge_pb.WatchStateRequest(), NO_CONTEXT))
+        assert round(gap_s, 6) <= HEARTBEAT_S, "as the schema says"
+        assert gap_s * LATE_REPORTS < silence_s
 
     check()
