@@ -18,6 +18,8 @@ FROM ${NATS_IMAGE} AS released
 
 FROM base AS official
 COPY --from=released /nats-server /usr/sbin/nats-server
+RUN version="$(nats-server --version)" \
+ && echo "nats-server ${version##* v}" >> /usr/share/robot-gateway-packages.txt
 USER 10020:10020
 
 FROM ${DEBIAN_IMAGE} AS packaged

@@ -64,6 +64,16 @@ def test_the_hubs_images_list_their_packages_with_versions(image: str, package: 
     assert f"{package} {inside}" in listed.splitlines()
 
 
+@pytest.mark.usefixtures("images")
+def test_the_hubs_server_is_listed_with_its_version() -> None:
+    run = ("run", "--rm", "--network=none", "--entrypoint")
+    listed = docker(*run, "cat", f"robot-hub-nats:{TAG}", "/usr/share/robot-gateway-packages.txt")
+    says = docker(*run, "nats-server", f"robot-hub-nats:{TAG}", "--version")
+    (version,) = (line.split()[1] for line in listed.splitlines() if line.startswith("nats-server "))
+    # That of Debian's package has a revision behind it.
+    assert version.partition("-")[0] == says.strip().rpartition("v")[2]
+
+
 def build(image: str) -> None:
     """Builds an image on Debian's, which the others share, with a layer and a command of its own."""
     dockerfile = f'FROM debian:bookworm-slim\nRUN echo {image} > /name\nCMD ["cat", "/name"]\n'
