@@ -92,14 +92,16 @@ class Housekeeping:
             recordings: whether they may go, too; else segments of the ring alone.
         """
         await self.measure()
-        with_ring = need + (self.ring_claim if recordings else 0)
-        if self._expected_bytes >= with_ring:
+        enough = need + (self.ring_claim if recordings else 0)
+        if self._expected_bytes >= enough:
             return True
         deletable = await attempt(
             "what may be deleted is unknown", lambda: self._deletable(need, recordings=recordings)
         )
         for each, freed in deletable or ():
-            if self._expected_bytes >= (need if each.ring else with_ring):
+            if each.ring:
+                enough = need  # Nor does a recording that comes after the ring go for it.
+            if self._expected_bytes >= enough:
                 break
             if await attempt(f"{each.name} stays", lambda each=each: self._let_go(each)):  # type: ignore[misc]
                 self._to_come.expect(freed, time.monotonic())

@@ -61,20 +61,32 @@ def frees(order: Sequence[Keepable]) -> list[tuple[Keepable, int]]:
     """Returns what helps to make room, with the bytes that each frees when those before it are gone.
 
     A file takes its room until its last name is gone. What shares all of its files with something that
-    stays is left out: deleting it would free nothing.
+    stays is left out: deleting it would free nothing. A recording that frees nothing unless the ring goes
+    comes after the ring: segments that it does not share may be enough.
     """
-    names = Counter(file.inode for each in order for file in each.files)
-    left = {file.inode: file.links for each in order for file in each.files}
+    names = _names(order)
+    without_ring = _names(each for each in order if not each.ring)
+    helpful = [each for each in order if _frees_any(each, names)]
+    helpful.sort(key=lambda each: not each.ring and not _frees_any(each, without_ring))
+    left = {file.inode: file.links for each in helpful for file in each.files}
     found = []
-    for each in order:
-        if not any(names[file.inode] >= file.links for file in each.files):
-            continue
+    for each in helpful:
         freed = 0
         for file in each.files:
             left[file.inode] -= 1
             freed += 0 if left[file.inode] else file.bytes
         found.append((each, freed))
     return found
+
+
+def _names(of: Iterable[Keepable]) -> Counter[tuple[int, int]]:
+    """Returns how many names each file has in these."""
+    return Counter(file.inode for each in of for file in each.files)
+
+
+def _frees_any(each: Keepable, names: Counter[tuple[int, int]]) -> bool:
+    """Returns whether one of its files has no other names than these."""
+    return any(names[file.inode] >= file.links for file in each.files)
 
 
 def _rank(each: Keepable) -> tuple[int, int, int, str]:

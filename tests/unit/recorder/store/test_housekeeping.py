@@ -13,7 +13,7 @@ from recorder.store import housekeeping
 from recorder.store.catalogue import Catalogue
 from recorder.store.housekeeping import WALK_EVERY_S, Housekeeping
 from recorder.store.manifest import Kind, Manifest, RecordingState
-from recorder.store.ring import Ring, RingSegment
+from recorder.store.ring import Ring, RingSegment, link_next
 from recorder.store.room import Disk
 from recorder.values import SegmentSummary
 from tests.support.clock import Clock
@@ -172,6 +172,15 @@ class Together:
         }
         self.housekeeping = Housekeeping(RecorderSettings(**values), self.catalogue, self.ring)
 
+    def incident(self) -> Manifest:
+        """Makes an incident that has the oldest segment of the ring."""
+        manifest = Manifest(
+            id="20260101T000009Z-aaaaaa", ordinal=9, kind=Kind.INCIDENT, state=RecordingState.COMPLETE
+        )
+        made = link_next(self.catalogue.create(manifest), manifest, self.ring.segments[0])
+        self.catalogue.write(made)
+        return made
+
     @staticmethod
     def _summary(path: Path, size: int, number: int) -> SegmentSummary:
         path.write_bytes(bytes([number]) * size)
@@ -211,6 +220,32 @@ async def test_the_ring_alone_deletes_no_recording(tmp_path: Path, monkeypatch: 
     ground = Together(tmp_path, monkeypatch)
     assert await ground.housekeeping.make_room(50_000, recordings=False)
     assert len(ground.catalogue.all) == 4
+    assert ground.ring.segments == []
+
+
+async def test_an_incident_that_is_all_in_the_ring_goes_after_the_ring(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The defect: the newest incident was deleted before the ring, and freed nothing."""
+    ground = Together(tmp_path, monkeypatch, held=3, pinned=True)
+    incident = ground.incident()
+    assert await ground.housekeeping.make_room(50_000)
+    assert ground.catalogue.get(incident.id)
+    assert [each.number for each in ground.ring.segments] == [2]
+    assert await ground.housekeeping.make_room(250_000)
+    assert ground.catalogue.get(incident.id) is None
+    assert len(ground.catalogue.all) == 4
+
+
+async def test_an_incident_that_is_all_in_the_ring_does_not_go_for_the_ring(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ground = Together(tmp_path, monkeypatch, held=2, pinned=True)
+    incident = ground.incident()
+    await ground.housekeeping.measure()
+    assert ground.housekeeping.ring_claim > 0
+    assert await ground.housekeeping.make_room(100_000)
+    assert ground.catalogue.get(incident.id), "there is room but for what the ring lacks"
     assert ground.ring.segments == []
 
 

@@ -1,5 +1,7 @@
 """What goes first, and what never goes."""
 
+from dataclasses import replace
+
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -71,6 +73,27 @@ def test_what_shares_everything_with_something_that_stays_is_left_out() -> None:
     backed_up = stored(1, links=2)
     assert freed(recording("a", backed_up), recording("b", stored(2)), recording("c")) == [("b", 10)]
     assert freed(recording("a", backed_up, stored(3))) == [("a", 10)]
+
+
+def segment(name: str, file: Stored, ended_ns: int = 0) -> Keepable:
+    return Keepable(name, ended_ns, ring=True, files=(file,))
+
+
+def test_what_frees_nothing_without_the_ring_goes_after_the_ring() -> None:
+    """The defect: it went before the ring, freed nothing, and the ring dropped the last name of its files."""
+    shared, also_shared, backed_up = stored(1, links=2), stored(2, links=2), stored(3, links=2)
+    incident = recording("incident", shared, backed_up)
+    partly = recording("partly", stored(4), also_shared)
+    ring = [segment("old", shared), segment("middle", also_shared, 1), segment("new", stored(5), 2)]
+    order = in_order([incident, partly, *ring])
+    assert freed(*order) == [("partly", 10), ("old", 0), ("middle", 10), ("new", 10), ("incident", 10)]
+
+
+def test_a_copy_that_shares_everything_with_the_ring_goes_after_the_ring() -> None:
+    shared = stored(1, links=3)
+    copied = replace(recording("copied", shared), copied=True)
+    order = in_order([copied, recording("other", shared), segment("ring", shared)])
+    assert freed(*order) == [("ring", 0), ("copied", 0), ("other", 10)]
 
 
 def test_the_order_of_making_counts_and_not_the_calendar() -> None:
