@@ -17,9 +17,9 @@ class SampleQueue:
 
     When it is full, the new messages are dropped, and one Loss for each of their channels follows as soon
     as the writer has caught up. After a frame of the video those that follow it are dropped as well, up to
-    the next one at which a decoder can begin: without it they would be decoded into wrong pictures. Losses
-    of others are merged by channel and cause meanwhile, and of the notes with one name the newest is kept:
-    neither grows without bound.
+    the next one at which a decoder can begin: without it they would be decoded into wrong pictures. Their
+    Loss follows then, so that it is one. Losses of others are merged by channel and cause meanwhile, and of
+    the notes with one name the newest is kept: neither grows without bound.
 
     Args:
         max_bytes: what waits at most.
@@ -38,6 +38,8 @@ class SampleQueue:
         self._woken = False
         self._awaits_key_frame = False
         """Whether a frame of the video was dropped, and none has come since at which a decoder can begin."""
+        self._held: Loss | None = None
+        """The frames dropped so far, while it waits for that one."""
         self.dropped = 0
 
     def put(self, items: Sequence[Item]) -> None:
@@ -53,11 +55,18 @@ class SampleQueue:
             self._woken = True
             self._changed.notify()
 
-    def take(self, timeout_s: float) -> list[Item]:
-        """Returns what waits, in order; empty after `timeout_s` without anything, or after `wake`."""
+    def take(self, timeout_s: float, *, so_far: bool = False) -> list[Item]:
+        """Returns what waits, in order; empty after `timeout_s` without anything, or after `wake`.
+
+        Args:
+            timeout_s: to wait at most.
+            so_far: whether a loss of the video that lasts is returned, too: what it belongs to may end.
+        """
         with self._changed:
             self._changed.wait_for(lambda: self._items or self._losses or self._woken, timeout_s)
             self._woken = False
+            if so_far:
+                self._end_held()
             taken = [*self._items, *self._notes.values(), *self._losses.values()]
             self._items.clear()
             self._notes.clear()
@@ -73,18 +82,29 @@ class SampleQueue:
         if not cut_off and (not self._items or self._bytes + size <= self._max_bytes):
             self._items.append(item)
             self._bytes += size
-            self._awaits_key_frame = self._awaits_key_frame and not is_frame
+            if is_frame and self._awaits_key_frame:
+                self._awaits_key_frame = False
+                self._end_held()
         elif isinstance(item, Sample):
             self.dropped += 1
-            self._awaits_key_frame = self._awaits_key_frame or is_frame
             at_ns = item.log_time_ns
-            self._merge(Loss(item.channel, GapCause.QUEUE, at_ns, at_ns, 1))
+            loss = Loss(item.channel, GapCause.QUEUE, at_ns, at_ns, 1)
+            if is_frame:
+                self._awaits_key_frame = True
+                self._held = merged(self._held, loss) if self._held else loss
+            else:
+                self._merge(loss)
         elif isinstance(item, Loss):
             self._merge(item)
         elif isinstance(item, Ended):
             self._items.append(item)  # There is at most one for each subscription.
         else:
             self._notes[item.name] = item
+
+    def _end_held(self) -> None:
+        if self._held:
+            self._merge(self._held)
+            self._held = None
 
     def _merge(self, loss: Loss) -> None:
         key = loss.channel, loss.cause

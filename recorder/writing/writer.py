@@ -145,7 +145,8 @@ class Writer:
         while not (self._stopping and not self._jobs):
             # Before the items: what was put before a job was submitted is written before the job.
             jobs = len(self._jobs)
-            for item in self._queue.take(0.0 if jobs else max(0.0, flush_at_s - time.monotonic())):
+            wait_s = 0.0 if jobs else max(0.0, flush_at_s - time.monotonic())
+            for item in self._queue.take(wait_s, so_far=jobs > 0):
                 self._write(item)
                 # Also within what has waited: on a slow disk it takes seconds.
                 flush_at_s = self._flush_if_due(flush_at_s)

@@ -14,6 +14,7 @@ ODOM, SCAN = (
     Channel(topic, "std_msgs/msg/String", b"", "", "", latched=False, presets=frozenset())
     for topic in ("/odom", "/scan")
 )
+VIDEO = replace(ODOM, topic=VIDEO_TOPIC)
 
 
 def sample(of: Channel = ODOM, at_ns: int = 0, size: int = 100) -> Sample:
@@ -42,33 +43,60 @@ def test_nothing_vanishes_without_a_loss(sent: list[tuple[Channel, int]]) -> Non
     assert queue.dropped == len(sent) - sum(isinstance(each, Sample) for each in taken)
 
 
+def frame(at_ns: int, *, key: bool = False) -> Sample:
+    return replace(sample(VIDEO, at_ns), follows=not key)
+
+
 def test_what_follows_a_dropped_frame_is_dropped_up_to_the_next_key_frame() -> None:
     """The defect: frames were recorded that no decoder shows as they were."""
-    video = replace(ODOM, topic=VIDEO_TOPIC)
-
-    def frame(at_ns: int, *, key: bool) -> Sample:
-        return replace(sample(video, at_ns), follows=not key)
-
     queue = SampleQueue(800)
-    first, second = frame(0, key=True), frame(1, key=False)
-    queue.put([first, second, frame(2, key=False)])
-    assert queue.take(0) == [first, second, Loss(video, GapCause.QUEUE, 2, 2, 1)]
+    first, second = frame(0, key=True), frame(1)
+    queue.put([first, second, frame(2)])
+    assert queue.take(0) == [first, second]
     topic = sample(at_ns=3)
-    queue.put([frame(3, key=False), topic, frame(4, key=False)])
-    assert queue.take(0) == [topic, Loss(video, GapCause.QUEUE, 3, 4, 2)]
-    again = [frame(5, key=True), frame(6, key=False)]
+    queue.put([frame(3), topic, frame(4)])
+    assert queue.take(0) == [topic]
+    again = [frame(5, key=True), frame(6)]
     queue.put(again)
-    assert queue.take(0) == again
+    assert queue.take(0) == [*again, Loss(VIDEO, GapCause.QUEUE, 2, 4, 3)]
     assert queue.dropped == 3
 
 
 def test_a_key_frame_that_is_dropped_takes_what_follows_with_it() -> None:
-    video = replace(ODOM, topic=VIDEO_TOPIC)
     queue = SampleQueue(400)
-    queue.put([sample(), sample(video, 1)])
-    assert queue.take(0) == [sample(), Loss(video, GapCause.QUEUE, 1, 1, 1)]
-    queue.put([replace(sample(video, 2), follows=True)])
-    assert queue.take(0) == [Loss(video, GapCause.QUEUE, 2, 2, 1)]
+    queue.put([sample(), frame(1, key=True)])
+    assert queue.take(0) == [sample()]
+    queue.put([frame(2)])
+    assert queue.take(0) == []
+    queue.put([sample(), frame(3, key=True)])
+    assert queue.take(0) == [sample()]
+    queue.put([frame(4, key=True)])
+    assert queue.take(0) == [frame(4, key=True), Loss(VIDEO, GapCause.QUEUE, 1, 3, 3)]
+
+
+def test_frames_dropped_up_to_the_next_key_frame_are_one_loss() -> None:
+    """The defect: each of them was taken as a loss of its own, and a manifest keeps 1000 gaps."""
+    queue = SampleQueue(400)
+    queue.put([frame(0, key=True), frame(1)])
+    taken = queue.take(0)
+    for at_ns in range(2, 60):
+        queue.put([frame(at_ns)])
+        taken += queue.take(0)
+    queue.put([frame(60, key=True)])
+    assert [each for each in [*taken, *queue.take(0)] if isinstance(each, Loss)] == [
+        Loss(VIDEO, GapCause.QUEUE, 1, 59, 59)
+    ]
+
+
+def test_before_an_output_may_be_closed_the_loss_so_far_is_taken() -> None:
+    queue = SampleQueue(400)
+    queue.put([frame(0, key=True), frame(1), frame(2)])
+    assert queue.take(0, so_far=True) == [frame(0, key=True), Loss(VIDEO, GapCause.QUEUE, 1, 2, 2)]
+    assert queue.take(0, so_far=True) == []
+    queue.put([frame(3)])
+    assert queue.take(0) == []
+    queue.put([frame(4, key=True)])
+    assert queue.take(0) == [frame(4, key=True), Loss(VIDEO, GapCause.QUEUE, 3, 3, 1)]
 
 
 def test_a_message_larger_than_the_queue_passes_alone() -> None:
