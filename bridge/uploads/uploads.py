@@ -630,7 +630,12 @@ def _is_known(upload: Upload, copy: results.RecordingCopy) -> bool:
 
 
 def _differs(upload: Upload, recording: results.Recording) -> bool:
-    """Returns whether a recording is not the one that was verified: a folder of experiments may grow."""
+    """Returns whether a recording is not the one that was verified: a folder of experiments may grow.
+
+    Of one that the robot's disk refuses to read nothing is known: it has failed, and has no files.
+    """
+    if recording.state is results.RecordingState.FAULTED and not recording.file_count:
+        return False
     return recording.size != upload.size or bool(
         recording.sha256 and upload.sha256 and recording.sha256 != upload.sha256
     )
