@@ -20,6 +20,11 @@ def start_command(program: str) -> str:
     return f"{supervisor} {program}" if supervisor else f"{program} serve"
 
 
+def is_supervised() -> bool:
+    """Returns whether units of systemd start the programs on this machine."""
+    return bool(os.environ.get(_VARIABLE))
+
+
 def messages_remedy() -> str:
     """Returns what gives the gateway the message packages of the robot's own nodes, in their version."""
     if _OF_IMAGE.exists():
@@ -28,7 +33,7 @@ def messages_remedy() -> str:
             "&& docker compose up -d gateway (YOLO_ROS_COMMIT in .env chooses the version of yolo_msgs)"
         )
     workspace = "the workspace that the robot's own nodes use"
-    if os.environ.get(_VARIABLE):
+    if is_supervised():
         return (
             "Type: sudo scripts/install-robot --ros-setup /opt/robot-workspace/setup.bash "
             f"&& {start_command('robot-gateway')} (with the setup.bash of {workspace})"

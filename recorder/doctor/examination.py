@@ -3,6 +3,7 @@
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Final
 
 import grpc
 
@@ -10,7 +11,7 @@ from common.config_finding import checked_settings
 from common.errors import UserError
 from common.findings import Finding, good, note, wrong
 from common.ros_transport_findings import transport_finding
-from common.start_command import start_command
+from common.start_command import is_supervised, start_command
 from recorder.config import RecorderSettings
 from recorder.doctor.judgement import (
     bundle_findings,
@@ -20,6 +21,9 @@ from recorder.doctor.judgement import (
 )
 from recorder.rpc.client import newest_state
 from recorder.store.room import Limits, disk_of, used_bytes
+
+_HIDDEN: Final = tuple(map(Path, ("/home", "/root", "/run/user", "/tmp", "/var/tmp")))  # noqa: S108
+"""Folders of which a unit has none, or its own: systemd.exec(5), "ProtectHome" and "PrivateTmp"."""
 
 
 def examine(config_file: Path | None) -> Iterator[Finding]:
@@ -33,7 +37,8 @@ def examine(config_file: Path | None) -> Iterator[Finding]:
         return
     yield from _folder(settings)
     for each in settings.run_bundles:
-        yield from bundle_findings(each, _unreadable(each))
+        problem = _unreadable(each)
+        yield from bundle_findings(each, problem, None if problem else _hidden_below(each))
     try:
         yield from program_findings(newest_state(settings.socket))
     except grpc.RpcError as error:
@@ -76,6 +81,14 @@ def _unreadable(folder: Path) -> str:
     except OSError as error:
         return error.strerror or str(error)
     return ""
+
+
+def _hidden_below(folder: Path) -> Path | None:
+    """Returns which of the folders that the recorder's unit hides has this one; None if none has."""
+    if not is_supervised():
+        return None
+    whole = folder.resolve()
+    return next((each for each in _HIDDEN if whole.is_relative_to(each)), None)
 
 
 def _graph(settings: RecorderSettings) -> Iterator[Finding]:

@@ -43,20 +43,30 @@ def folder_findings(settings: RecorderSettings, room_bytes: int, *, writable: bo
         yield good("ring", f"the ring keeps {settings.ring.seconds} s of {settings.ring.preset}")
 
 
-def bundle_findings(folder: Path, problem: str) -> Iterator[Finding]:
+def bundle_findings(folder: Path, problem: str, hidden_below: Path | None) -> Iterator[Finding]:
     """Yields whether a folder of the robot's own experiments can be read.
 
     Args:
         folder: one of `run_bundles`.
         problem: why it can't be read; empty if it can.
+        hidden_below: the folder around it that the recorder's unit hides; None if it hides none.
     """
+    unlisted = "The experiments in it are neither listed nor exported"
     if problem:
         yield wrong(
             "run_bundles",
             f"{folder} can't be read: {problem}",
-            "The experiments in it are neither listed nor exported",
+            unlisted,
             "Let the recorder's user read it, where the recorder runs: a container needs a mount, and a "
             "systemd unit sees nothing below /home (docs/recording.md)",
+        )
+    elif hidden_below:
+        yield note(
+            "run_bundles",
+            f"{folder} can be read, but robot-recorder.service sees nothing below {hidden_below}",
+            f"{unlisted}, unless the unit was changed",
+            "Move it, to /srv/runs for example, set run_bundles to that, and type: "
+            "sudo systemctl restart robot-recorder",
         )
     else:
         yield good("run_bundles", f"{folder} can be read")

@@ -4,6 +4,8 @@ import json
 from itertools import islice
 from pathlib import Path
 
+import pytest
+
 from common.findings import Verdict
 from recorder.config import MIB
 from recorder.doctor.examination import examine
@@ -16,18 +18,40 @@ def room_mib(config: Path) -> int:
     return int(what.removesuffix(" MiB").rpartition(" ")[2])
 
 
+def bundles(directory: Path, folders: list[Path]) -> list[tuple[Verdict, str]]:
+    """What the doctor says of folders of experiments, before it looks for the program and the graph."""
+    config = directory / "recorder.yaml"
+    settings = {"root": str(directory / "root"), "run_bundles": [str(each) for each in folders]}
+    config.write_text(json.dumps(settings), encoding="utf-8")  # JSON is YAML
+    found = islice((each for each in examine(config) if each.check == "run_bundles"), len(folders))
+    return [(each.verdict, each.what) for each in found]
+
+
 def test_a_folder_of_experiments_that_can_not_be_read_is_wrong(tmp_path: Path) -> None:
     there, gone = tmp_path / "there", tmp_path / "gone"
     there.mkdir()
-    config = tmp_path / "recorder.yaml"
-    settings = {"root": str(tmp_path / "root"), "run_bundles": [str(there), str(gone)]}
-    config.write_text(json.dumps(settings), encoding="utf-8")  # JSON is YAML
-    # Both come before it looks for the program and the graph.
-    found = list(islice((each for each in examine(config) if each.check == "run_bundles"), 2))
-    assert [(each.verdict, each.what) for each in found] == [
+    assert bundles(tmp_path, [there, gone]) == [
         (Verdict.GOOD, f"{there} can be read"),
         (Verdict.WRONG, f"{gone} can't be read: No such file or directory"),
     ]
+
+
+def test_a_folder_of_experiments_that_the_unit_hides_can_not_be_read_by_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The defect: the doctor, which runs outside the unit, said that it can be read."""
+    home, elsewhere = tmp_path / "home", tmp_path / "elsewhere"
+    (home / "runs").mkdir(parents=True)
+    elsewhere.mkdir()
+    (elsewhere / "link").symlink_to(home / "runs")
+    monkeypatch.setattr("recorder.doctor.examination._HIDDEN", (home,))
+    folders = [home / "runs", elsewhere / "link", elsewhere]
+    readable = [(Verdict.GOOD, f"{each} can be read") for each in folders]
+    assert bundles(tmp_path, folders) == readable
+    monkeypatch.setenv("ROBOT_GATEWAY_START", "sudo systemctl restart")
+    hidden = f"can be read, but robot-recorder.service sees nothing below {home}"
+    noted = [(Verdict.NOTE, f"{each} {hidden}") for each in folders[:2]]
+    assert bundles(tmp_path, folders) == [*noted, readable[2]]
 
 
 async def test_a_ring_outside_the_root_counts_as_in_the_recorder(tmp_path: Path) -> None:
