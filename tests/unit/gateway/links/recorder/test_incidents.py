@@ -41,7 +41,7 @@ async def until(condition: Callable[[], bool]) -> None:
     async def ask() -> bool:
         return condition()
 
-    await eventually(ask, bool, "the reports get there", 10.0)
+    await eventually(ask, bool, "the reports get there")
 
 
 async def turns() -> None:
@@ -95,10 +95,10 @@ async def test_a_recorder_that_is_away_gets_it_later_but_not_too_late() -> None:
     incidents = Incidents(calls, lambda: now[0])
     running = asyncio.create_task(incidents.run())
     incidents.take([FAULT])
-    await asyncio.wait_for(calls.tried.wait(), 5)
+    await until(calls.tried.is_set)
     calls.error = None
     calls.tried.clear()
-    await asyncio.wait_for(calls.tried.wait(), 5)
+    await until(calls.tried.is_set)
     await turns()
     assert (calls.reported, incidents.expired) == (["vision.silent"], 0)
     calls.error = RecorderUnreachableError("gone")
@@ -127,17 +127,17 @@ async def test_what_the_recorder_can_not_take_at_present_is_reported_again_but_n
     incidents = Incidents(calls, lambda: now[0])
     running = asyncio.create_task(incidents.run())
     incidents.take([FAULT])
-    await asyncio.wait_for(calls.tried.wait(), 5)
+    await until(calls.tried.is_set)
     calls.error = None
     calls.tried.clear()
-    await asyncio.wait_for(calls.tried.wait(), 5)
+    await until(calls.tried.is_set)
     await turns()
     assert (calls.reported, incidents.expired) == (["vision.silent"], 0)
     assert caplog.messages == [f"no incident of vision.silent yet, which is tried again: {refusal}"]
     calls.error = refusal
     calls.tried.clear()
     incidents.take([FAULT, of("odometry.silent")])
-    await asyncio.wait_for(calls.tried.wait(), 5)
+    await until(calls.tried.is_set)
     now[0] += EXPIRED_S + 1
     await until(lambda: incidents.expired == 1)
     assert calls.reported == ["vision.silent"]
