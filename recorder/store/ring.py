@@ -167,7 +167,7 @@ class Ring:
         segment.path.unlink(missing_ok=True)
 
     def give_up(self, segment: RingSegment) -> None:
-        """Deletes a segment for want of room.
+        """Deletes a segment for want of room, and those before it: no snapshot knows of a hole.
 
         Raises:
             OSError: the disk fails.
@@ -175,10 +175,11 @@ class Ring:
         if not self.is_short(now_ns := time.monotonic_ns()):
             _log.warning("%s has no room for all that the ring is to keep: it is shorter", self.directory)
         self._cut_ns = now_ns
-        self.drop(segment)
+        for each in self.segments[: self.segments.index(segment) + 1]:
+            self.drop(each)
 
     def give_up_named(self, name: str) -> bool:
-        """Deletes the segment whose file has that name, for want of room; returns whether there was one.
+        """Gives up the segment whose file has that name; returns whether there was one.
 
         Raises:
             OSError: the disk fails.

@@ -249,6 +249,17 @@ async def test_an_incident_that_is_all_in_the_ring_does_not_go_for_the_ring(
     assert ground.ring.segments == []
 
 
+async def test_a_ring_that_gives_way_has_no_hole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The defect: what an incident has stayed, and a later snapshot had it, but not what followed."""
+    ground = Together(tmp_path, monkeypatch, held=4)
+    incident = ground.incident()
+    assert await ground.housekeeping.make_room(50_000, recordings=False)
+    assert [each.number for each in ground.ring.segments] == [2, 3]
+    kept = ground.catalogue.folder_of(incident) / incident.files[0].name
+    assert kept.stat().st_nlink == 1
+    assert not (tmp_path / "ring" / Ring.name(0)).exists()
+
+
 async def test_what_snapshots_have_of_the_ring_is_lacking_as_well(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
