@@ -1,5 +1,6 @@
 """The robot's base as the ROS 2 graph shows it, and the publisher of its velocities."""
 
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Final
@@ -9,6 +10,7 @@ from rclpy.duration import Duration
 from common.ros_node import OWN_NODES, OwnNode, message_class, ros_node
 from drive.config import DriveSettings, Output
 from drive.lock import Lock
+from drive.lock_topic import LockTopic
 from drive.other_sources import OtherSources
 from drive.outranking import Outranking
 from drive.stop_input import stop_inputs
@@ -84,7 +86,9 @@ class Base:
         outputs = [output.topic for output in settings.outputs]
         mux_output = settings.mux_output.topic if settings.mux_output else None
         self._velocities = VelocityPublisher(node, settings.outputs)
-        self._lock = Lock(node, settings.lock_topic) if settings.lock_topic else None
+        self._lock = (
+            Lock(LockTopic(node, settings.lock_topic), time.monotonic_ns()) if settings.lock_topic else None
+        )
         self._takers = Takers(node, self._velocities, outputs, mux_output, OWN_NODES)
         self._outranking = Outranking() if settings.mux_output else None
         self._mux_output = (
@@ -107,10 +111,13 @@ class Base:
         if self._outranking:
             self._outranking.published(velocity, now_ns)
 
-    def lock(self, *, active: bool) -> None:
-        """Locks or unlocks the multiplexer, where it can be and no other program may hold it."""
-        if self._lock:
-            self._lock.publish(active=active)
+    def lock(self, now_ns: int, *, active: bool) -> bool:
+        """Locks or unlocks the multiplexer, where it can be and no other program may hold it.
+
+        Returns:
+            Whether that is decided; False where a release has to be requested again later.
+        """
+        return self._lock.publish(now_ns, active=active) if self._lock else True
 
     def matched(self) -> int:
         """Returns how many subscriptions take the velocities, observers included."""

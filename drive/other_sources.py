@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from common.ros_node import OWN_NODES
 from drive.subscriptions import newest, subscribe, velocity_of
-from drive.values import MS, ZERO
+from drive.values import DISCOVERY_NS, MS, ZERO
 
 _log = logging.getLogger(__name__)
 
@@ -19,8 +19,6 @@ _TYPES: Final = frozenset({"geometry_msgs/msg/TwistStamped", "geometry_msgs/msg/
 _MOST: Final = 16
 """Inputs that are listened to; any more are a mistake of the graph."""
 _LOOK_EVERY_NS: Final = 500 * MS
-_DISCOVERY_NS: Final = 3_000 * MS
-"""Until the multiplexer, its inputs and what publishes on them are discovered, if there are any."""
 _TAKE_EVERY_NS: Final = 100 * MS
 """Only a reset asks for it."""
 _COMMANDED_NS: Final = 1_000 * MS
@@ -69,7 +67,7 @@ class OtherSources:
             foreign_motion_ns: when one of them last moved the base; 0 if none has. The multiplexer may have
                 discovered it before it was discovered here.
         """
-        return now_ns - max(self._began_ns, foreign_motion_ns) >= _DISCOVERY_NS
+        return now_ns - max(self._began_ns, foreign_motion_ns) >= DISCOVERY_NS
 
     def commanding(self, now_ns: int) -> tuple[str, ...]:
         """Returns the topics on which motion was commanded lately."""

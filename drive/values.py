@@ -11,6 +11,8 @@ from typing import Final
 
 MS: Final = 1_000_000
 """Nanoseconds in a millisecond."""
+DISCOVERY_NS: Final = 3_000 * MS
+"""Until a program that joins the graph has discovered the others, if there are any."""
 
 
 @dataclass(frozen=True, slots=True)

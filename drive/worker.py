@@ -54,8 +54,8 @@ class BasePort(Protocol):
     def publish(self, velocity: Velocity, now_ns: int) -> None:
         """Publishes a velocity."""
 
-    def lock(self, *, active: bool) -> None:
-        """Locks or unlocks the multiplexer, where it can be."""
+    def lock(self, now_ns: int, *, active: bool) -> bool:
+        """Locks or unlocks the multiplexer, where it can be; returns whether that is decided."""
 
     def observed(self, now_ns: int) -> Surroundings:
         """Returns what the graph says now."""
@@ -260,10 +260,10 @@ class Worker:
         """Repeats the lock while it is to be active, and its release a few times."""
         if self._state.locked(now_ns):
             self._unlocks = _FAREWELL_ZEROS
-            self._base.lock(active=True)
-        elif self._unlocks:
+            self._base.lock(now_ns, active=True)
+        elif self._unlocks and self._base.lock(now_ns, active=False):
+            # One that is not decided yet is requested in each cycle.
             self._unlocks -= 1
-            self._base.lock(active=False)
 
     def _beat(self, now_ns: int) -> None:
         try:

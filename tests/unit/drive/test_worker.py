@@ -29,6 +29,7 @@ class World:
         self.script: deque[tuple[int, Received | Exception]] = deque()
         self.surroundings = CLEAR
         self.observing_takes_ns = 0
+        self.release_waits_until_ns = 0
         self.guard_gone = False
         self.guard_says = deque([b"1"])
         self.sequence = 0
@@ -66,8 +67,9 @@ class World:
     def publish(self, velocity: Velocity, _now_ns: int) -> None:
         self.journal.append(("velocity", velocity, self.now_ns))
 
-    def lock(self, *, active: bool) -> None:
+    def lock(self, _now_ns: int, *, active: bool) -> bool:
         self.journal.append(("lock", active, self.now_ns))
+        return active or self.now_ns >= self.release_waits_until_ns
 
     def observed(self, _now_ns: int) -> Surroundings:
         self.now_ns += self.observing_takes_ns
@@ -299,6 +301,17 @@ def test_zeros_precede_the_lock_and_the_lock_is_taken_back(world: World) -> None
     assert 310 <= locks[0][0] <= 350
     assert {active for ms, active in locks if ms < 500} == {True}
     assert [active for ms, active in locks if ms >= 500][-5:] == [False] * 5
+
+
+def test_a_release_of_the_lock_that_has_to_wait_is_requested_until_it_is_decided(world: World) -> None:
+    world.release_waits_until_ns = START_NS + 3000 * MS
+    world.at(5, Peer.JOINED)
+    world.at(10, pb.ToDrive(stop=pb.Stop(by="ben")))
+    world.at(500, pb.ToDrive(reset=pb.Reset(stop_id=1)))
+    world.end(5000)
+    world.worker.run()
+    decided = [ns for kind, _, ns in world.journal if kind == "lock" and ns >= world.release_waits_until_ns]
+    assert len(decided) == 5
 
 
 def test_nothing_is_said_where_others_have_the_robot(world: World) -> None:
