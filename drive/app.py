@@ -68,7 +68,7 @@ def work(settings: DriveSettings) -> None:
     state = State.at_start(time.monotonic_ns(), enabled=False, latch=stops.latch, last_stop_id=stops.last_id)
     with (
         worker_heartbeats() as heartbeats,
-        base(settings) as robot_base,
+        base(settings, lock_left=stops.lock_left) as robot_base,
         Endpoint(settings.socket, welcome(new_instance_id(), rules, settings.base_timeout_ms)) as endpoint,
     ):
         worker = Worker(
@@ -98,15 +98,15 @@ def work(settings: DriveSettings) -> None:
 def _keep_loss(settings: DriveSettings, worker: Worker) -> None:
     """Leaves a stop for the next start, where a driver lost the robot by the end of the guard.
 
-    Otherwise the guard keeps stops, and the motion that is to be recorded; it has gone.
+    Otherwise the guard keeps stops, the motion that is to be recorded, and a lock that is left; it has gone.
     """
     state = worker.state
     latch = state.latch
     if latch is None and state.held_last and settings.on_loss is OnLoss.HOLD:
         reason = "the guard of robot-drive was lost while a driver had the robot"
         latch = Latch(state.last_stop_id + 1, "robot-drive", reason)
-    if latch or worker.unrecorded:
+    if latch or worker.unrecorded or worker.lock_left:
         stop_file = StopFile(settings.stop_path)
         last_id = latch.stop_id if latch else state.last_stop_id
-        stop_file.keep(Stops(last_id, latch, worker.unrecorded))
+        stop_file.keep(Stops(last_id, latch, worker.unrecorded, worker.lock_left))
         stop_file.close()

@@ -80,14 +80,22 @@ class VelocityPublisher:
 
 
 class Base:
-    """What the graph says about the base, and the publisher of its velocities."""
+    """What the graph says about the base, and the publisher of its velocities.
 
-    def __init__(self, node: Any, settings: DriveSettings) -> None:
+    Args:
+        node: of rclpy.
+        settings: of the drive program.
+        lock_left: whether an earlier process has left the lock active.
+    """
+
+    def __init__(self, node: Any, settings: DriveSettings, *, lock_left: bool) -> None:
         outputs = [output.topic for output in settings.outputs]
         mux_output = settings.mux_output.topic if settings.mux_output else None
         self._velocities = VelocityPublisher(node, settings.outputs)
         self._lock = (
-            Lock(LockTopic(node, settings.lock_topic), time.monotonic_ns()) if settings.lock_topic else None
+            Lock(LockTopic(node, settings.lock_topic), time.monotonic_ns(), left=lock_left)
+            if settings.lock_topic
+            else None
         )
         self._takers = Takers(node, self._velocities, outputs, mux_output, OWN_NODES)
         self._outranking = Outranking() if settings.mux_output else None
@@ -118,6 +126,10 @@ class Base:
             Whether that is decided; False where a release has to be requested again later.
         """
         return self._lock.publish(now_ns, active=active) if self._lock else True
+
+    def lock_left(self) -> bool:
+        """Returns whether the lock was published here, and is not known to be released since."""
+        return self._lock is not None and self._lock.left
 
     def matched(self) -> int:
         """Returns how many subscriptions take the velocities, observers included."""
@@ -168,11 +180,15 @@ class Base:
 
 
 @contextmanager
-def base(settings: DriveSettings) -> Iterator[Base]:
+def base(settings: DriveSettings, *, lock_left: bool) -> Iterator[Base]:
     """Yields the base; leaves the graph when the block ends.
+
+    Args:
+        settings: of the drive program.
+        lock_left: whether an earlier process has left the lock active.
 
     Raises:
         UserError: ROS 2 can't be used, or a message type is not installed.
     """
     with ros_node(OwnNode.DRIVE) as node:
-        yield Base(node, settings)
+        yield Base(node, settings, lock_left=lock_left)

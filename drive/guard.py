@@ -218,7 +218,8 @@ class Guard:
         watch.beat(time.monotonic_ns(), leased=actual.phase not in RESTING_PHASES)
         stop = actual.stop
         latch = Latch(stop.stop_id, stop.by, stop.reason) if actual.HasField("stop") else None
-        self._stops = replace(self._stops, last_id=max(self._stops.last_id, stop.stop_id), latch=latch)
+        last_id = max(self._stops.last_id, stop.stop_id)
+        self._stops = replace(self._stops, last_id=last_id, latch=latch, lock_left=actual.lock_left)
         self._keep_episode(episode_of(actual))
 
     def _judge_takeover(self, actual: pb.ActualState, *, first: bool) -> None:

@@ -37,18 +37,23 @@ class Lock:
         topic: of the lock.
         began_ns: when this program joined the graph: other publishers are not discovered at once, and until
             they are, it is not known whether there are any.
+        left: whether an earlier process has left the lock active; its messages do not come again.
     """
 
-    def __init__(self, topic: TopicPort, began_ns: int) -> None:
+    def __init__(self, topic: TopicPort, began_ns: int, *, left: bool) -> None:
         self._topic = topic
         self._known_ns = began_ns + DISCOVERY_NS
-        self._wanted = self._active = False
+        self._wanted, self._active = False, left
         """For a stop; and as it was published last, here or by another program."""
+        self._discovered = False
+        """Whether there was time to discover other programs."""
         self._waits = False
         """Whether a release waits until it is known which other programs publish."""
         self._others: tuple[str, ...] = ()
         """Nodes that publish it, too, when last looked for."""
         self._looked_ns = self._take_due_ns = 0
+        self.left = left
+        """Whether it was published by this program, and is not known to be released since."""
 
     def publish(self, now_ns: int, *, active: bool) -> bool:
         """Locks; or releases, unless another program may hold the lock.
@@ -59,7 +64,7 @@ class Lock:
         self._wanted = active
         self._waits = not active and now_ns < self._known_ns
         if active:
-            self._active = True
+            self._active = self.left = True
             self._topic.publish(active=True)
         elif not self._waits:
             self._release(now_ns)
@@ -72,6 +77,8 @@ class Lock:
             newest = self._topic.newest()
             if newest is not None:
                 self._active = newest
+                self.left = self.left and (newest or self._wanted)
+        self._discovered = now_ns >= self._known_ns
         if self._active and now_ns - self._looked_ns >= _LOOK_EVERY_NS:
             self._looked_ns = now_ns
             self._others = self._topic.others()
@@ -94,15 +101,16 @@ class Lock:
                 "robot-drive it is not known whether another program publishes it. If none does, it is "
                 "released then"
             )
+        unnamed = "by a program that has gone" if self._discovered else "it is not known yet by which program"
         return (
             f"the lock on {topic} is active, and nothing of lower priority moves the robot: release it "
-            f"where it was pressed ({names or 'by a program that has gone'}); if it is only left of a stop, "
+            f"where it was pressed ({names or unnamed}); if it is only left of a stop, "
             f"type: ros2 topic pub --once {topic} std_msgs/msg/Bool '{{data: false}}'"
         )
 
     def _release(self, now_ns: int) -> None:
         self._others = self._topic.others()
         if not self._others:
-            self._active = False
+            self._active = self.left = False
             self._take_due_ns = now_ns + _OWN_ECHO_NS
             self._topic.publish(active=False)

@@ -1,8 +1,9 @@
-"""What outlives the program, in one small file: a stop, the number of the last one, an unrecorded motion.
+"""What outlives the program, in one small file: a stop, the last one's number, an unrecorded motion, a lock.
 
 A latched stop may have locked the robot's multiplexer, which stays locked when the program ends; and a person
 who stops the robot does not mean "until the next restart". Numbers go on, so that a reset of an old stop
-never meets a new one. A time of motion stays until a gateway has recorded it.
+never meets a new one. A time of motion stays until a gateway has recorded it. A lock that a reset has left
+active, because another program publishes it, too, is named until it is released.
 """
 
 import json
@@ -33,11 +34,13 @@ class Stops:
         last_id: number of the newest, reset or not. 0 before the first.
         latch: the stop in force; None without one.
         episode: a time of motion that has ended and that no gateway has recorded; None without one.
+        lock_left: whether the multiplexer was locked for a stop, and is not known to be released since.
     """
 
     last_id: int = 0
     latch: Latch | None = None
     episode: Episode | None = None
+    lock_left: bool = False
 
     @classmethod
     def from_json(cls, text: str | bytes) -> "Stops":
@@ -50,9 +53,9 @@ class Stops:
         latch = fields["latch"] and Latch(
             int(fields["latch"]["stop_id"]), str(fields["latch"]["by"]), str(fields["latch"]["reason"])
         )
-        # Missing in a file of an earlier release.
+        # Both are missing in files of earlier releases.
         episode = Episode(**fields["episode"]) if fields.get("episode") else None
-        return cls(int(fields["last_id"]), latch or None, episode)
+        return cls(int(fields["last_id"]), latch or None, episode, bool(fields.get("lock_left")))
 
     def as_json(self) -> str:
         """Returns the description for the file and for the worker."""

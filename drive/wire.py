@@ -168,15 +168,16 @@ def actual_state(
     return message
 
 
-def heartbeat(state: State, episode: Episode | None, matched: int) -> pb.ActualState:
+def heartbeat(state: State, episode: Episode | None, matched: int, *, lock_left: bool) -> pb.ActualState:
     """Returns what the guard needs of the report of a state: it comes 50 times a second.
 
     Args:
         state: of the machine.
         episode: the newest.
         matched: how many subscriptions take the velocities.
+        lock_left: whether the lock was published, and is not known to be released since.
     """
-    message = pb.ActualState(phase=PHASES[state.phase], matched=matched)
+    message = pb.ActualState(phase=PHASES[state.phase], matched=matched, lock_left=lock_left)
     _add_what_is_kept(message, state, episode)
     return message
 

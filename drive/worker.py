@@ -57,6 +57,9 @@ class BasePort(Protocol):
     def lock(self, now_ns: int, *, active: bool) -> bool:
         """Locks or unlocks the multiplexer, where it can be; returns whether that is decided."""
 
+    def lock_left(self) -> bool:
+        """Returns whether the lock was published here, and is not known to be released since."""
+
     def observed(self, now_ns: int) -> Surroundings:
         """Returns what the graph says now."""
 
@@ -163,6 +166,11 @@ class Worker:
         return self._episode if self._episode and self._episode.unrecorded else None
 
     @property
+    def lock_left(self) -> bool:
+        """Whether the lock was published, and is not known to be released since."""
+        return self._base.lock_left()
+
+    @property
     def _due_ns(self) -> int:
         """When the next cycle is due: at once after the end of a rest."""
         return self._cycled_ns + (_REST_CYCLE_NS if self._state.phase in RESTING else _CYCLE_NS)
@@ -267,7 +275,7 @@ class Worker:
 
     def _beat(self, now_ns: int) -> None:
         try:
-            beat = wire.heartbeat(self._state, self._episode, self._matched)
+            beat = wire.heartbeat(self._state, self._episode, self._matched, lock_left=self.lock_left)
             self._heartbeats.send(beat.SerializeToString(), socket.MSG_DONTWAIT)
         except BlockingIOError:
             self._judge_guard(now_ns)

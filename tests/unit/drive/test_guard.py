@@ -36,14 +36,16 @@ beats = socket.socket(fileno=int(os.environ["DRIVE_HEARTBEATS"]))
 if then == "ignore":
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
 episode = pb.Episode(episode_id=3, holder="anna", started_ns=1, distance_m=0.5)
-phase = pb.PHASE_AVAILABLE if then == "rest" else pb.PHASE_DRIVING
+phase = pb.PHASE_AVAILABLE if then in ("rest", "lock") else pb.PHASE_DRIVING
 if later and then.startswith("PHASE_"):
     phase = pb.Phase.Value(then)
+with open(started + ".stops", "w") as file:
+    file.write(os.environ["DRIVE_STOPS"])
 for number in range(1_000_000):
     if number == 20 or then == "garbage":
         begin()
     matched = int(os.path.exists(started + ".matched"))
-    state = pb.ActualState(phase=phase, episode=episode, matched=matched)
+    state = pb.ActualState(phase=phase, episode=episode, matched=matched, lock_left=then == "lock")
     beats.send(b"\\xff\\xff" if then == "garbage" else state.SerializeToString())
     if then == "listen":
         try:
@@ -244,3 +246,14 @@ def test_the_worker_learns_how_many_take_the_guards_zeros(tmp_path: Path) -> Non
         wait_until(lambda: heard.exists() and heard.read_bytes() == b"1", "it reaches the base")
         running.zeros.takers = 0
         wait_until(lambda: heard.read_bytes() == b"10", "it does not any more")
+
+
+def test_a_lock_that_a_worker_has_left_is_handed_on(tmp_path: Path) -> None:
+    with guarding(tmp_path, "lock") as running:
+        os.kill(running.worker(), signal.SIGKILL)
+        running.worker(2)
+        assert Stops.from_json((tmp_path / "started.stops").read_bytes()).lock_left
+    assert read_stops(running.stop_file).lock_left
+    with guarding(tmp_path, "rest", stops=Stops(lock_left=True)) as running:
+        running.worker(3)
+        wait_until(lambda: not read_stops(running.stop_file).lock_left, "a worker that knows of its release")

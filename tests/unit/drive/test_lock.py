@@ -19,9 +19,10 @@ class Topic:
     discovered: tuple[str, ...] = ()
     published: list[bool] = field(default_factory=list)
     arrived: bool | None = None
+    left: bool = False
 
     def __post_init__(self) -> None:
-        self.lock = Lock(self, BEGAN_MS * MS)
+        self.lock = Lock(self, BEGAN_MS * MS, left=self.left)
 
     def publish(self, *, active: bool) -> None:
         self.published.append(active)
@@ -40,6 +41,9 @@ class Topic:
     def releases(self, at_ms: float) -> bool:
         """Requests a release; returns whether it is decided."""
         return self.lock.publish(int(at_ms * MS), active=False)
+
+    def is_left(self) -> bool:
+        return self.lock.left
 
     def problem(self, at_ms: float) -> str:
         self.lock.observe(int(at_ms * MS))
@@ -113,3 +117,36 @@ def test_a_lock_that_is_left_by_a_program_that_has_gone_says_what_to_type(topic:
     problem = topic.problem(DISCOVERED_MS)
     assert "by a program that has gone" in problem
     assert "ros2 topic pub --once /lock std_msgs/msg/Bool '{data: false}'" in problem
+
+
+def test_a_lock_that_an_earlier_process_has_left_is_named_until_it_is_released() -> None:
+    """The defect: the next worker heard nothing, and the problem was gone while the robot was locked."""
+    topic = Topic(left=True)
+    assert "it is not known yet by which program" in topic.problem(BEGAN_MS + 100)
+    topic.discovered = ("button",)
+    assert "(button)" in topic.problem(DISCOVERED_MS)
+    assert topic.is_left()
+    topic.arrived = False
+    assert topic.problem(DISCOVERED_MS + 100) == ""
+    assert not topic.is_left()
+    assert topic.published == []
+
+
+def test_it_is_left_until_its_release_is_published_or_heard(topic: Topic) -> None:
+    assert not topic.is_left()
+    topic.locks(DISCOVERED_MS)
+    topic.arrived = False
+    topic.problem(DISCOVERED_MS + 100)
+    assert topic.is_left(), "it is published again in the next cycle"
+    topic.discovered = ("button",)
+    topic.releases(DISCOVERED_MS + 200)
+    assert topic.is_left()
+    topic.discovered = ()
+    topic.releases(DISCOVERED_MS + 300)
+    assert not topic.is_left()
+
+
+def test_a_lock_of_another_program_is_not_left_by_this_one(topic: Topic) -> None:
+    topic.arrived = True
+    assert topic.problem(DISCOVERED_MS)
+    assert not topic.is_left()

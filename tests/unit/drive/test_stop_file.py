@@ -19,7 +19,7 @@ def test_a_stop_and_its_number_outlive_the_program(tmp_path: Path) -> None:
     path = tmp_path / "state" / "stop.json"
     assert read_stops(path) == Stops()
     moved = Episode(3, "anna", 10, 20, 0.5, 0.1, "released")
-    for stops in (STOPPED, Stops(7), Stops(7, STOPPED.latch, moved)):
+    for stops in (STOPPED, Stops(7), Stops(7, STOPPED.latch, moved), Stops(7, lock_left=True)):
         file = StopFile(path)
         file.keep(stops)
         file.close()

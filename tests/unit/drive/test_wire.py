@@ -131,8 +131,8 @@ def test_the_welcome_has_the_limits_in_effect() -> None:
 
 def test_a_heartbeat_has_what_the_guard_keeps() -> None:
     latch, episode = Latch(4, "ben", "a child"), Episode(3, "anna", 10, 20, 0.5, 0.25, "released")
-    beat = heartbeat(State(phase=Phase.STOPPED, latch=latch), episode, 2)
-    assert (beat.phase, beat.matched) == (PHASES[Phase.STOPPED], 2)
+    beat = heartbeat(State(phase=Phase.STOPPED, latch=latch), episode, 2, lock_left=True)
+    assert (beat.phase, beat.matched, beat.lock_left) == (PHASES[Phase.STOPPED], 2, True)
     assert (beat.stop.stop_id, beat.stop.by, beat.stop.reason) == (4, "ben", "a child")
     assert episode_of(beat) == episode
-    assert not heartbeat(State(phase=Phase.ARMED), None, 0).HasField("stop")
+    assert not heartbeat(State(phase=Phase.ARMED), None, 0, lock_left=False).HasField("stop")

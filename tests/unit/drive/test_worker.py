@@ -71,6 +71,9 @@ class World:
         self.journal.append(("lock", active, self.now_ns))
         return active or self.now_ns >= self.release_waits_until_ns
 
+    def lock_left(self) -> bool:
+        return any(kind == "lock" for kind, _, _ in self.journal)
+
     def observed(self, _now_ns: int) -> Surroundings:
         self.now_ns += self.observing_takes_ns
         return self.surroundings
@@ -312,6 +315,15 @@ def test_a_release_of_the_lock_that_has_to_wait_is_requested_until_it_is_decided
     world.worker.run()
     decided = [ns for kind, _, ns in world.journal if kind == "lock" and ns >= world.release_waits_until_ns]
     assert len(decided) == 5
+
+
+def test_the_guard_knows_of_a_lock_that_is_left(world: World) -> None:
+    world.at(5, Peer.JOINED)
+    world.at(10, pb.ToDrive(stop=pb.Stop(by="ben")))
+    world.end(1000)
+    world.worker.run()
+    assert not world.beats()[0].lock_left
+    assert world.beats()[-1].lock_left
 
 
 def test_nothing_is_said_where_others_have_the_robot(world: World) -> None:

@@ -631,6 +631,7 @@ class ActualState(_message.Message):
     ENABLED_FIELD_NUMBER: _builtins.int
     TURN_LIMIT_RAD_S_FIELD_NUMBER: _builtins.int
     MATCHED_FIELD_NUMBER: _builtins.int
+    LOCK_LEFT_FIELD_NUMBER: _builtins.int
     monotonic_ns: _builtins.int
     """The instant."""
     applied_revision: _builtins.int
@@ -659,6 +660,10 @@ class ActualState(_message.Message):
     """Limit of the turning rate by the picture's age, in rad/s. Unset by a drive program of an earlier release."""
     matched: _builtins.int
     """How many subscriptions take the worker's velocities. In heartbeats to the guard alone."""
+    lock_left: _builtins.bool
+    """Whether the worker has locked the multiplexer, and the lock is not known to be released since. In heartbeats
+    to the guard alone.
+    """
     @_builtins.property
     def inhibits(self) -> _containers.RepeatedScalarFieldContainer[Global___Inhibit.ValueType]:
         """Why nothing moves."""
@@ -701,10 +706,11 @@ class ActualState(_message.Message):
         enabled: _builtins.bool | None = ...,
         turn_limit_rad_s: _builtins.float | None = ...,
         matched: _builtins.int = ...,
+        lock_left: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_enabled", b"_enabled", "_turn_limit_rad_s", b"_turn_limit_rad_s", "counters", b"counters", "enabled", b"enabled", "episode", b"episode", "stop", b"stop", "turn_limit_rad_s", b"turn_limit_rad_s"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_enabled", b"_enabled", "_turn_limit_rad_s", b"_turn_limit_rad_s", "applied_revision", b"applied_revision", "command_ns", b"command_ns", "counters", b"counters", "enabled", b"enabled", "episode", b"episode", "inhibits", b"inhibits", "matched", b"matched", "monotonic_ns", b"monotonic_ns", "newest_sequence", b"newest_sequence", "phase", b"phase", "problems", b"problems", "reset_obstacle", b"reset_obstacle", "session_id", b"session_id", "speed_limit_mps", b"speed_limit_mps", "stop", b"stop", "turn_limit_rad_s", b"turn_limit_rad_s", "vx_mps", b"vx_mps", "vy_mps", b"vy_mps", "wz_rad_s", b"wz_rad_s"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_enabled", b"_enabled", "_turn_limit_rad_s", b"_turn_limit_rad_s", "applied_revision", b"applied_revision", "command_ns", b"command_ns", "counters", b"counters", "enabled", b"enabled", "episode", b"episode", "inhibits", b"inhibits", "lock_left", b"lock_left", "matched", b"matched", "monotonic_ns", b"monotonic_ns", "newest_sequence", b"newest_sequence", "phase", b"phase", "problems", b"problems", "reset_obstacle", b"reset_obstacle", "session_id", b"session_id", "speed_limit_mps", b"speed_limit_mps", "stop", b"stop", "turn_limit_rad_s", b"turn_limit_rad_s", "vx_mps", b"vx_mps", "vy_mps", b"vy_mps", "wz_rad_s", b"wz_rad_s"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__enabled: _TypeAlias = _typing.Literal["enabled"]  # noqa: Y015
     _WhichOneofArgType__enabled: _TypeAlias = _typing.Literal["_enabled", b"_enabled"]  # noqa: Y015
