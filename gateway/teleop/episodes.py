@@ -9,7 +9,7 @@ from gateway.status.teleop import DriveEpisode
 from gateway.teleop.lease import Driver
 
 _REMEMBERED: Final = 8
-"""Drivers and their devices: the end of a motion may be reported after its lease, and after the next hold."""
+"""Drivers, and devices of each: the end of a motion may be reported after its lease and after later holds."""
 _NS_PER_S: Final = 1_000_000_000
 
 
@@ -18,6 +18,27 @@ class EpisodeSink(Protocol):
 
     def record_action(self, action: ControlAction) -> None:
         """Takes an action of this instant."""
+
+
+class _Drive:
+    """A driver, from their first hold to the next driver's.
+
+    Args:
+        driver: who drives.
+        began_ns: monotonic.
+    """
+
+    def __init__(self, driver: Driver, began_ns: int) -> None:
+        self.driver, self.began_ns = driver, began_ns
+        self._devices: deque[tuple[int, str]] = deque(maxlen=_REMEMBERED)
+
+    def note(self, device: str, now_ns: int) -> None:
+        """Notes what the driver holds with from now on."""
+        self._devices.append((now_ns, device))
+
+    def device_at(self, at_ns: int) -> str:
+        """Returns what the driver held with at an instant; empty if that is forgotten."""
+        return next((device for noted_ns, device in reversed(self._devices) if noted_ns <= at_ns), "")
 
 
 class Episodes:
@@ -30,12 +51,16 @@ class Episodes:
     def __init__(self, sink: EpisodeSink) -> None:
         self._sink = sink
         self._began_ns = time.monotonic_ns()
-        self._drivers: deque[tuple[int, Driver, str]] = deque(maxlen=_REMEMBERED)
+        self._drives: deque[_Drive] = deque(maxlen=_REMEMBERED)
         self._recorded: tuple[int, int] | None = None
 
     def note(self, driver: Driver, input_device: str) -> None:
         """Notes who drives from now on, and with what."""
-        self._drivers.append((time.monotonic_ns(), driver, input_device))
+        now_ns = time.monotonic_ns()
+        # A driver may change the device with every command, which must displace no other driver.
+        if not self._drives or self._drives[-1].driver != driver:
+            self._drives.append(_Drive(driver, now_ns))
+        self._drives[-1].note(input_device, now_ns)
 
     def record(self, _instance_id: str, episode: DriveEpisode) -> None:
         """Records a time of motion that has ended, once.
@@ -65,9 +90,9 @@ class Episodes:
 
     def _driver_of(self, episode: DriveEpisode) -> tuple[Driver, str]:
         """Returns who drove, and with what at last."""
-        for noted_ns, driver, device in reversed(self._drivers):
-            if driver.name == episode.holder and noted_ns <= episode.ended_ns:
-                return driver, device
+        for drive in reversed(self._drives):
+            if drive.driver.name == episode.holder and drive.began_ns <= episode.ended_ns:
+                return drive.driver, drive.device_at(episode.ended_ns)
         return Driver("", episode.holder, ""), ""
 
     def _was_recorded(self, episode: DriveEpisode) -> bool:

@@ -9,6 +9,7 @@ from gateway.teleop.episodes import Episodes
 from gateway.teleop.lease import Driver
 
 ANNA = Driver("anna", "anna", "10.0.0.9:4711", "operator", "cafe01")
+BEN = Driver("ben", "ben", "10.0.0.8:4712", "admin", "cafe02", admin=True)
 
 
 class Sink:
@@ -52,6 +53,37 @@ def test_the_device_is_that_of_the_motion_and_not_of_the_hold_after_it() -> None
     episodes.record("process", motion)
     (action,) = sink.actions
     assert action.request.endswith("by gamepad")
+
+
+def test_changes_of_device_displace_neither_a_motions_driver_nor_any_other() -> None:
+    """The defect: each took the place of a driver, and a motion that was reported late had none."""
+    sink = Sink()
+    episodes = Episodes(sink)
+    episodes.note(BEN, "gamepad")
+    motions = [ended(1, "ben")]
+    episodes.note(ANNA, "keyboard")
+    motions.append(ended(2, "anna"))
+    for number in range(1000):
+        episodes.note(ANNA, ("gamepad", "monitor")[number % 2])
+    for motion in motions:
+        episodes.record("process", motion)
+    assert [(each.who, each.role, each.credential) for each in sink.actions] == [
+        ("ben", "admin", "cafe02"),
+        ("anna", "operator", "cafe01"),
+    ]
+    assert sink.actions[0].request.endswith("by gamepad")
+    assert " by " not in sink.actions[1].request, "its device is forgotten, and no later one is named"
+
+
+def test_a_motion_is_of_the_credential_that_drove_and_not_of_a_later_one_of_that_name() -> None:
+    sink = Sink()
+    episodes = Episodes(sink)
+    episodes.note(ANNA, "keyboard")
+    motion = ended()
+    episodes.note(replace(ANNA, credential="cafe03"), "gamepad")
+    episodes.record("process", motion)
+    (action,) = sink.actions
+    assert action.credential == "cafe01"
 
 
 def test_it_is_recorded_once_for_each_process() -> None:
