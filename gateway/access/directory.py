@@ -27,6 +27,14 @@ _OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
 _MAX_BYTES: Final = 1 << 20
 _STORE: Final = "credentials.json"
 _MADE_BY_INIT: Final = frozenset({_STORE, "ca.pem", "ca-key.pem", "server.pem", "server-key.pem"})
+_REPLACEMENTS: Final = {
+    "server": (
+        "replace both (HOST: a name by which laptops reach this robot)",
+        "rotate server --host HOST",
+    ),
+    "ca": ("make a new authority, whose certificate every laptop then needs", "rotate ca"),
+}
+"""By the argument of `rotate`: what it does, and the command."""
 
 _T = TypeVar("_T")
 
@@ -57,15 +65,22 @@ class KeyPairFiles:
         try:
             matches = key_matches(pair)
         except ValueError as error:
-            raise UserError(
-                f"a certificate or key of {self.certificate} can't be parsed: {error}", "Both must be PEM"
-            ) from error
+            raise self.unparsed(error) from error
         if not matches:
             raise UserError(
                 f"{self.key} is not the key of {self.certificate}",
                 f"To replace both, type: {credentials_command(f'rotate {self.argument}', self.key.parent)}",
             )
         return pair
+
+    def unparsed(self, error: ValueError) -> UserError:
+        """Returns the error of a certificate or key that can't be parsed."""
+        return UserError(
+            f"a certificate or key of {self.certificate} can't be parsed: {error}",
+            f"Restore copies of both, or {_replacement(self.certificate, self.argument)}"
+            if _made_by_init(self.certificate)
+            else "Replace them by PEM files, the key without a passphrase",
+        )
 
     def contents(self, pair: KeyPair) -> dict[Path, bytes]:
         """Returns what to write, the key first: a reader in between finds no match, and reads again."""
@@ -142,6 +157,34 @@ def read_public(path: Path, name: str) -> bytes:
     return _read(path, name)[0]
 
 
+def read_authority(path: Path, parse: Callable[[bytes], _T]) -> _T:
+    """Returns what `parse` makes of the certificate of an authority.
+
+    Raises:
+        UserError: it can't be read, or `parse` raises a ValueError.
+    """
+    try:
+        return parse(read_public(path, "certificate authority"))
+    except ValueError as error:
+        raise UserError(
+            f"the certificate authority {path} can't be parsed: {error}",
+            f"Restore a copy, or {_replacement(path, 'ca')}"
+            if _made_by_init(path)
+            else "Replace it by a PEM file",
+        ) from error
+
+
+def _made_by_init(path: Path) -> bool:
+    """Whether `init` has created a file; another one may be a purchased certificate, which has to stay."""
+    return path.name in _MADE_BY_INIT
+
+
+def _replacement(certificate: Path, argument: str) -> str:
+    """Returns how to replace a certificate of which nothing can be read, not even its hosts."""
+    what, arguments = _REPLACEMENTS[argument]
+    return f"{what}: {credentials_command(arguments, certificate.parent)}"
+
+
 def _read_private(path: Path, name: str) -> bytes:
     content, status = _read(path, name)
     mode = stat.S_IMODE(status.st_mode)
@@ -179,6 +222,6 @@ def _read(path: Path, name: str) -> tuple[bytes, os.stat_result]:
 
 def _remedy(path: Path, error: OSError) -> str:
     """Suggests `init` only for missing files that it creates: it must not replace a purchased certificate."""
-    if isinstance(error, FileNotFoundError) and path.name in _MADE_BY_INIT:
+    if isinstance(error, FileNotFoundError) and _made_by_init(path):
         return f"Type: {credentials_command('init', path.parent)}"
     return "Check its path and permissions: the gateway's user must be able to read it"

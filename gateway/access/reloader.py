@@ -17,7 +17,7 @@ from typing import Final, NoReturn
 from common.ca import KeyPair, certificate_info, is_issued_by
 from common.errors import UserError
 from gateway.access.command import credentials_command
-from gateway.access.directory import CredentialDirectory, KeyPairFiles, read_public
+from gateway.access.directory import CredentialDirectory, KeyPairFiles, read_authority
 from gateway.access.store import Store
 from gateway.status.access import AccessView, CertificateExpiry, UnreadFile
 
@@ -100,18 +100,18 @@ def load_access(directory: CredentialDirectory, tls: TlsFiles | None) -> LoadedA
 def _with_certificates(store: Store, tls: TlsFiles | None) -> LoadedAccess:
     if tls is None:
         return LoadedAccess(store, None, {})
-    server = KeyPairFiles(tls.certificate, tls.key, "server certificate").read()
+    files = KeyPairFiles(tls.certificate, tls.key, "server certificate")
+    server = files.read()
     if tls.issuer:
         _check_issuer(server.certificate, tls.certificate, tls.issuer)
-    client_ca = read_public(tls.client_ca, "certificate authority") if tls.client_ca else None
     try:
         ends_s = {"server_certificate": certificate_info(server.certificate).ends_s}
-        if client_ca:
-            ends_s["authority"] = certificate_info(client_ca).ends_s
     except ValueError as error:
-        raise UserError(
-            f"the certificate authority {tls.client_ca} can't be parsed: {error}", "It must be PEM"
-        ) from error
+        raise files.unparsed(error) from error
+    client_ca = None
+    if tls.client_ca:
+        client_ca, info = read_authority(tls.client_ca, lambda pem: (pem, certificate_info(pem)))
+        ends_s["authority"] = info.ends_s
     return LoadedAccess(store, TlsMaterial(server, client_ca), ends_s)
 
 
@@ -120,12 +120,7 @@ def _check_issuer(certificate: bytes, file: Path, authority: Path) -> None:
 
     So it is after a crash in the middle of `rotate ca`, where each certificate has its key.
     """
-    try:
-        issued = is_issued_by(certificate, read_public(authority, "certificate authority"))
-    except ValueError as error:
-        raise UserError(
-            f"the certificate authority {authority} can't be parsed: {error}", "It must be PEM"
-        ) from error
+    issued = read_authority(authority, lambda pem: is_issued_by(certificate, pem))
     if not issued:
         raise UserError(
             f"{file} was not issued by the certificate authority {authority}, so that no laptop trusts it",

@@ -51,3 +51,37 @@ def test_what_is_there_and_can_not_be_read_is_not_to_be_made_anew(tmp_path: Path
     with pytest.raises(UserError, match="Is a directory") as caught:
         directory.read_store()
     assert "permissions" in caught.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("pair", "remedy"),
+    [
+        (
+            "server",
+            "Restore copies of both, or replace both (HOST: a name by which laptops reach this robot): "
+            "robot-gateway credentials rotate server --host HOST --directory {path}",
+        ),
+        (
+            "ca",
+            "Restore copies of both, or make a new authority, whose certificate every laptop then needs: "
+            "robot-gateway credentials rotate ca --directory {path}",
+        ),
+    ],
+)
+def test_a_damaged_pair_is_to_be_restored_or_replaced(tmp_path: Path, pair: str, remedy: str) -> None:
+    directory = CredentialDirectory(tmp_path)
+    CredentialAdmin(directory, "lab").initialize(("localhost",))
+    files: KeyPairFiles = getattr(directory, pair)
+    files.certificate.write_text("damaged")
+    with pytest.raises(UserError, match="can't be parsed") as caught:
+        files.read()
+    assert caught.value.remedy == remedy.format(path=tmp_path)
+
+
+def test_a_damaged_pair_of_another_authority_is_not_to_be_made_anew(tmp_path: Path) -> None:
+    for name in ("bought.pem", "bought-key.pem"):
+        (tmp_path / name).write_text("damaged")
+        (tmp_path / name).chmod(0o600)
+    with pytest.raises(UserError, match="can't be parsed") as caught:
+        KeyPairFiles(tmp_path / "bought.pem", tmp_path / "bought-key.pem", "server certificate").read()
+    assert caught.value.remedy == "Replace them by PEM files, the key without a passphrase"

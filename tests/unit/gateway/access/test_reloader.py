@@ -5,6 +5,7 @@ import re
 import threading
 import time
 from contextlib import suppress
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 
@@ -245,3 +246,30 @@ def test_a_certificate_of_another_authority_needs_none_of_the_robots(
     access_files = SecuritySettings.model_validate({"credentials": directory.path, "tls": tls}).access_files()
     assert access_files
     assert load_access(*access_files).tls
+
+
+@pytest.mark.parametrize("of_clients", [True, False])
+def test_a_damaged_authority_is_to_be_restored_or_replaced(
+    directory: CredentialDirectory, of_clients: bool
+) -> None:
+    authority = directory.ca.certificate
+    authority.write_text("damaged")
+    tls = (
+        replace(tls_of(directory), issuer=None) if of_clients else replace(tls_of(directory), client_ca=None)
+    )
+    with pytest.raises(UserError, match=f"authority {authority} can't be parsed") as caught:
+        load_access(directory, tls)
+    assert caught.value.remedy == (
+        "Restore a copy, or make a new authority, whose certificate every laptop then needs: "
+        f"robot-gateway credentials rotate ca --directory {directory.path}"
+    )
+
+
+def test_a_damaged_authority_of_others_is_not_to_be_made_anew(
+    directory: CredentialDirectory, tmp_path: Path
+) -> None:
+    bought = tmp_path / "bought.pem"
+    bought.write_text("damaged")
+    with pytest.raises(UserError, match="can't be parsed") as caught:
+        load_access(directory, replace(tls_of(directory), client_ca=bought))
+    assert caught.value.remedy == "Replace it by a PEM file"
