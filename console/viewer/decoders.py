@@ -63,8 +63,9 @@ class Decoders:
         for codec in HARDWARE:
             try:
                 element = self._prove(codec)
-            except UserError:
-                # GStreamer is missing; the first connection reports it.
+            except (UserError, ImportError):
+                # GStreamer is missing; the first connection reports it. An ImportError is what Python makes
+                # of that where another thread imports it at the same time.
                 return
             if element:
                 self._proven = self._proven | {codec: element}

@@ -67,7 +67,8 @@ def test_every_field_of_a_report_arrives() -> None:
         assert part == kind(**{field.name: getattr(source, field.name) for field in fields(kind)})
     own = {"instance_id", "velocity", "limits", "base_timeout_ms"}
     # What only heartbeats to the guard have is no part of a report.
-    sent = set(message.DESCRIPTOR.fields_by_name) - {"vx_mps", "vy_mps", "wz_rad_s", "matched"}
+    of_the_guard = {"matched", "lock_left"}
+    sent = set(message.DESCRIPTOR.fields_by_name) - {"vx_mps", "vy_mps", "wz_rad_s"} - of_the_guard
     # The gateway knows its own commands.
     assert {field.name for field in fields(DriveActual)} - own == sent - {"newest_sequence", "command_ns"}
 
