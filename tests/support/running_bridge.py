@@ -72,7 +72,7 @@ class Received:
 
 async def received(hub: Hub, robot: str = ROBOT) -> Received:
     """Returns all that the hub has now."""
-    info = await hub.api(f"STREAM.INFO.{names.EVENTS}")  # Where the streams are, the call has its own name.
+    info = await hub.stream_info(names.EVENTS)
     result = Received()
     if info["state"]["messages"] == 0:
         return result

@@ -8,6 +8,8 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, Final
 
+import pytest
+
 from fleet import names
 from fleet.connection import Hub
 from fleet.replies import Message
@@ -99,8 +101,10 @@ def permitted(subject: str) -> bool:
 
 
 async def test_no_question_of_the_hub_is_answered_with_the_configuration(
-    tmp_path: Path, hub: Hub, gateway: EventServer, servers: NatsServers
+    tmp_path: Path, hub: Hub, gateway: EventServer, servers: NatsServers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # The tap counts as a program that answers at people's name of the call, and never does.
+    monkeypatch.setattr(names, "info_subject", lambda stream: f"$JS.API.STREAM.INFO.{stream}")
     settings = {"commands": {"allowed": ["upload", "snapshot"]}, **configuration(tmp_path, gateway.port)}
     async with tapped(servers) as (hostile, heard):
         with bridge_program(tmp_path / "bridge", gateway.port, servers.urls, **settings) as bridge:
