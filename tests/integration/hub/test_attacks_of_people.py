@@ -15,6 +15,7 @@ from fleet.clock import read_clock
 from fleet.connection import FleetAddress, Published, Start
 from fleet.errors import HubError, HubReason, RefusedError
 from fleet.serving import Request
+from fleet.session import Session
 from tests.support.attacked_hub import connected, everything, put_marks, store_with_status, thiefs_session
 from tests.support.nats_servers import DEBIAN_SERVER, SERVER
 from tests.support.secure_hub import SecureHub, secure_hub
@@ -257,9 +258,17 @@ async def test_headers_of_a_robot_change_nothing_of_what_people_read(
 
 
 async def test_a_status_of_a_robot_is_read_as_no_answer_of_the_hub(
-    hub: SecureHub, logins: dict[str, FleetAddress]
+    hub: SecureHub, logins: dict[str, FleetAddress], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The defect: everyone's list of the fleet, events and exporter failed at one message until a purge."""
+    """The defect: requests of people were sent again and again. 2.9 stores such a status, 2.15.1 none."""
+    requests: list[str] = []
+    send = Session.send
+
+    async def counted(self: Session, subject: str, payload: bytes, reply: str) -> None:
+        requests.append(subject)
+        await send(self, subject, payload, reply)
+
+    monkeypatch.setattr(Session, "send", counted)
     statuses = ("503", "404", "204", "408 Request Timeout")
     subjects = [f"fleet.a.ev.status.{number}" for number in range(len(statuses))]
     sequences = []
@@ -269,7 +278,9 @@ async def test_a_status_of_a_robot_is_read_as_no_answer_of_the_hub(
     ):
         for subject, status in zip(subjects, statuses, strict=True):
             await store_with_status(thief, subject, status)
+            requests.clear()
             newest = await reader.last(names.EVENTS, subject)
+            assert requests == [f"$JS.API.DIRECT.GET.{names.EVENTS}"]
             assert newest is not None
             assert newest.payload == subject.encode()
             sequences.append(newest.sequence)
