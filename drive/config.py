@@ -121,7 +121,7 @@ class DriveSettings(Settings):
             raise SettingsConflictError(
                 ("stop_topics", self.stop_topics.index(self.lock_topic)),
                 f"stop_topics lists {self.lock_topic}, which is lock_topic: robot-drive publishes there "
-                "itself, and could not tell the robot's own stop from its own lock",
+                "itself, and could not distinguish the robot's own stop from its lock",
                 "Give the stop button and the lock of robot-drive a topic each",
             )
 

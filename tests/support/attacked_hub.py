@@ -1,5 +1,6 @@
 """A hub that is attacked: connections without any wrapper, and what has to be as it was before."""
 
+import time
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
 
@@ -7,6 +8,7 @@ from fleet import names
 from fleet.connection import FleetAddress, Hub, connect
 from fleet.replies import parsed
 from fleet.session import Session
+from tests.support.secure_hub import SecureHub
 
 _CONNECT_S = 10.0
 
@@ -47,6 +49,23 @@ async def put_marks(administrator: Hub) -> None:
     """Puts a command that waits for b, and a state of it."""
     await administrator.put(names.STATES, "b", b"mine")
     await administrator.publish_once(names.command_subject("b", "waits"), b"command")
+
+
+@asynccontextmanager
+async def unchanged(hub: SecureHub, bait: bytes | None = None) -> AsyncGenerator[None, None]:
+    """Puts the marks, and fails where the block changes what the hub keeps of others than a.
+
+    Args:
+        hub: under attack.
+        bait: payload of an event of a, for what would take it elsewhere; None: no event.
+    """
+    async with connected(hub.administrator()) as administrator:
+        await put_marks(administrator)
+        if bait is not None:
+            await administrator.publish_once(names.event_subject("a", "bait", time.monotonic_ns()), bait)
+        before = await everything(administrator)
+        yield
+        assert await everything(administrator) == before
 
 
 async def everything(administrator: Hub) -> dict[str, object]:

@@ -5,6 +5,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
+
+import pytest
 
 from fleet.connection import FleetAddress, Hub
 from fleet.names import inbox_prefix
@@ -12,8 +15,17 @@ from hub import administration
 from hub.creation import HubPlan, create
 from hub.directory import HubDirectory
 from hub.server_config import Node, Places
-from tests.support.nats_servers import SERVER, NatsServers
+from tests.support.nats_servers import DEBIAN_SERVER, SERVER, NatsServers
 
+BOTH_SERVERS: Final = [
+    pytest.param(SERVER, id="newest"),
+    pytest.param(
+        DEBIAN_SERVER,
+        id="debian",
+        marks=pytest.mark.skipif(not DEBIAN_SERVER, reason="nats-server of Debian"),
+    ),
+]
+"""For a fixture: the server that this project brings, and the oldest that is supported."""
 _LOOPBACK = "127.0.0.1"
 _ANSWERS_WITHIN_S = 20.0
 """A handshake over TLS takes seconds on a busy machine."""

@@ -16,18 +16,9 @@ from fleet.connection import FleetAddress, Published, Start
 from fleet.errors import HubError, HubReason, RefusedError
 from fleet.serving import Request
 from fleet.session import Session
-from tests.support.attacked_hub import connected, everything, put_marks, store_with_status, thiefs_session
-from tests.support.nats_servers import DEBIAN_SERVER, SERVER
-from tests.support.secure_hub import SecureHub, secure_hub
+from tests.support.attacked_hub import connected, store_with_status, thiefs_session, unchanged
+from tests.support.secure_hub import BOTH_SERVERS, SecureHub, secure_hub
 
-_SERVERS = [
-    pytest.param(SERVER, id="newest"),
-    pytest.param(
-        DEBIAN_SERVER,
-        id="debian",
-        marks=pytest.mark.skipif(not DEBIAN_SERVER, reason="nats-server of Debian"),
-    ),
-]
 _LOGINS = ("reader", "commander", "exporter", "receiver")
 _READ = (
     names.EVENTS,
@@ -52,7 +43,7 @@ _REPLIES = (
 )
 
 
-@pytest.fixture(scope="module", params=_SERVERS)
+@pytest.fixture(scope="module", params=BOTH_SERVERS)
 def hub(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[SecureHub]:
     with secure_hub(tmp_path_factory.mktemp("hub"), binary=request.param) as hub:
         for robot in ("a", "b"):
@@ -154,13 +145,7 @@ async def test_no_answer_goes_into_the_place_of_another(
     hub: SecureHub, logins: dict[str, FleetAddress], login: str, reply: str
 ) -> None:
     """The servers publish answers with all rights of an account, wherever a client has them sent."""
-    async with (
-        connected(hub.administrator()) as administrator,
-        thiefs_session(logins[login]) as session,
-    ):
-        await put_marks(administrator)
-        await administrator.publish_once(names.event_subject("a", "bait", time.monotonic_ns()), b"")
-        before = await everything(administrator)
+    async with thiefs_session(logins[login]) as session, unchanged(hub, bait=b""):
         for stream in _READ:
             for request in (b"", b"{", b'{"seq": 1}', b'{"seq": 1000000}', b'{"last_by_subj": ">"}'):
                 await session.send(f"$JS.API.DIRECT.GET.{stream}", request, reply)
@@ -182,7 +167,6 @@ async def test_no_answer_goes_into_the_place_of_another(
             await session.request(f"$JS.API.DIRECT.GET.{stream}", b'{"seq": 1000000}', 5.0)
         if login == "receiver":
             await session.request("$KV.fleet_recordings.a.rec", b"", 5.0)
-        assert await everything(administrator) == before
 
 
 @pytest.mark.parametrize("to", [each for each in _REPLIES if not each.startswith("_")])
@@ -192,19 +176,13 @@ async def test_no_consumer_delivers_where_they_say(
 ) -> None:
     """A consumer that pushes delivers in the account of the streams."""
     async with (
-        connected(hub.administrator()) as administrator,
         thiefs_session(logins[login]) as session,
+        unchanged(hub, bait=b'{"batch": 1, "expires": 1000000000}'),
     ):
-        await put_marks(administrator)
-        await administrator.publish_once(
-            names.event_subject("a", "bait", time.monotonic_ns()), b'{"batch": 1, "expires": 1000000000}'
-        )
-        before = await everything(administrator)
         for stream in _READ:
             call = f"$JS.API.CONSUMER.CREATE.{stream}.pushes.>"
             with pytest.raises(RefusedError, match="do not permit"):
                 await session.request(call, _consumer(stream, name="pushes", deliver_subject=to), 5.0)
-        assert await everything(administrator) == before
 
 
 async def test_answers_of_receivers_to_people_put_nothing_into_streams(
@@ -215,18 +193,15 @@ async def test_answers_of_receivers_to_people_put_nothing_into_streams(
 
     async with (
         connected(logins["receiver"]) as receiver,
-        connected(hub.administrator()) as administrator,
         thiefs_session(logins["reader"]) as session,
+        unchanged(hub),
     ):
         await receiver.serve(names.READING_SUBJECTS, names.RECEIVERS, handle, at_once=100, of_people=True)
-        await put_marks(administrator)
-        before = await everything(administrator)
         subject = names.reading_subject("b", "get_files")
         for reply in (*_REPLIES, "_INBOXx.y"):
             await session.send(subject, b"", reply)
         # What was sent before is done when this is.
         assert (await session.request(subject, b"", 5.0)).payload == b"urls"
-        assert await everything(administrator) == before
 
 
 async def test_without_a_receiver_people_learn_of_it(logins: dict[str, FleetAddress]) -> None:

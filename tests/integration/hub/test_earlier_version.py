@@ -20,17 +20,8 @@ from hub.directory import ACCOUNTS_OF_PEOPLE, Kind, User
 from hub.server_config import with_accounts
 from hub.streams import stream_configs
 from tests.support.attacked_hub import connected
-from tests.support.nats_servers import DEBIAN_SERVER, SERVER
-from tests.support.secure_hub import SecureHub, first_answer
+from tests.support.secure_hub import BOTH_SERVERS, SecureHub, first_answer
 
-_SERVERS = [
-    pytest.param(SERVER, id="newest"),
-    pytest.param(
-        DEBIAN_SERVER,
-        id="debian",
-        marks=pytest.mark.skipif(not DEBIAN_SERVER, reason="nats-server of Debian"),
-    ),
-]
 _SERVICES = (
     Service(names.EVENT_SUBJECTS),
     Service(names.RESULT_SUBJECTS),
@@ -43,7 +34,7 @@ _SERVICES = (
 """All of them of the account of the streams, with the receivers in it."""
 
 
-@pytest.fixture(params=_SERVERS)
+@pytest.fixture(params=BOTH_SERVERS)
 def hub(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[SecureHub]:
     """Such a hub, with the robot r1."""
     hub = SecureHub(tmp_path, binary=request.param)

@@ -19,8 +19,7 @@ from fleet.connection import FleetAddress, connect
 from fleet.errors import HubError, HubReason
 from hub import accounts, administration
 from hub.cli import app
-from tests.support.nats_servers import DEBIAN_SERVER, SERVER
-from tests.support.secure_hub import SecureHub, secure_hub
+from tests.support.secure_hub import BOTH_SERVERS, SecureHub, secure_hub
 from tests.support.waiting import wait_until
 
 _REVOKED_WITHIN_S = 5.0
@@ -28,17 +27,9 @@ _LEARNED_WITHIN_S = 15.0
 """Both: docs/fleet.md. The second one is from a node's start, with the way back into the cluster."""
 _COMPARED_EVERY_S = 2.0
 """hub/server_config.py: the resolver's interval."""
-_SERVERS = [
-    pytest.param(SERVER, id="newest"),
-    pytest.param(
-        DEBIAN_SERVER,
-        id="debian",
-        marks=pytest.mark.skipif(not DEBIAN_SERVER, reason="nats-server of Debian"),
-    ),
-]
 
 
-@pytest.fixture(params=_SERVERS)
+@pytest.fixture(params=BOTH_SERVERS)
 def hub(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[SecureHub]:
     with secure_hub(tmp_path, binary=request.param) as hub:
         yield hub

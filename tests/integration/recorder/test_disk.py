@@ -6,8 +6,8 @@ import resource
 import shutil
 import subprocess
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager, suppress
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -696,16 +696,25 @@ def size_of(ring: Path) -> int:
     return sum(each.stat().st_size for each in ring.glob("*.mcap"))
 
 
-async def test_a_recording_on_a_full_disk_leaves_the_ring_what_it_holds(
+@asynccontextmanager
+async def beside_a_ring(
     small_disk: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The defect: a robot that has recorded for weeks, and is at its limit, had no ring."""
+) -> AsyncIterator[tuple[Running, Manifest]]:
+    """A recorder with one recording, and a ring of some final segments, on one disk."""
     monkeypatch.setattr(ring_recorder, "SEGMENT_S", 0.1)
     ring = {"preset": "all", "seconds": 3600}
     room = {"min_free_bytes": 8 * MIB}
     async with running_recorder(small_disk / "root", room=room, ring=ring) as running:
-        old = await recorded(running, MIB // 2)
+        done = await recorded(running, MIB // 2)
         await running.until(lambda: size_of(small_disk / "root" / "ring") > 400_000)
+        yield running, done
+
+
+async def test_a_recording_on_a_full_disk_leaves_the_ring_what_it_holds(
+    small_disk: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The defect: a robot that has recorded for weeks, and is at its limit, had no ring."""
+    async with beside_a_ring(small_disk, monkeypatch) as (running, old):
         await running.operations.start("1", StartOptions())
         assert running.status_reader.has(old.id)
         fill(small_disk, 11 * MIB + 3 * MIB // 4)
@@ -717,12 +726,7 @@ async def test_a_recording_on_a_full_disk_leaves_the_ring_what_it_holds(
 async def test_a_ring_that_gives_way_is_short_of_room(
     small_disk: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(ring_recorder, "SEGMENT_S", 0.1)
-    ring = {"preset": "all", "seconds": 3600}
-    room = {"min_free_bytes": 8 * MIB}
-    async with running_recorder(small_disk / "root", room=room, ring=ring) as running:
-        done = await recorded(running, MIB // 2)
-        await running.until(lambda: size_of(small_disk / "root" / "ring") > 400_000)
+    async with beside_a_ring(small_disk, monkeypatch) as (running, done):
         await running.until(lambda: not running.status_reader.disk_short)
         # Another program's: no recording goes for that.
         ballast = fill(small_disk, 9 * MIB)

@@ -43,7 +43,7 @@ def test_a_film_that_comes_whole_is_a_hundred_percent() -> None:
 
 
 def test_frames_of_a_film_that_are_missing_are_not_made_good_by_those_that_come_twice() -> None:
-    """The rate would not tell: as many came in the same time."""
+    """The rate would not show it: as many came in the same time."""
     seen = [number for number in (*range(101), *range(50, 60)) if number % 10 != 5]
     assert delivered_of_due_percent(captured(*seen), 60, 1.7) == 90.0
 

@@ -89,11 +89,8 @@ async def test_a_fault_that_becomes_an_error_while_it_is_reported_is_reported_as
     running.cancel()
 
 
-async def test_a_recorder_that_is_away_gets_it_later_but_not_too_late() -> None:
-    calls: Any = Calls()
-    calls.error, now = RecorderUnreachableError("gone"), [100.0]
-    incidents = Incidents(calls, lambda: now[0])
-    running = asyncio.create_task(incidents.run())
+async def is_reported_at_the_second_attempt(calls: Any, incidents: Incidents) -> None:
+    """The first one meets the error that `calls` has."""
     incidents.take([FAULT])
     await until(calls.tried.is_set)
     calls.error = None
@@ -101,6 +98,14 @@ async def test_a_recorder_that_is_away_gets_it_later_but_not_too_late() -> None:
     await until(calls.tried.is_set)
     await turns()
     assert (calls.reported, incidents.expired) == (["vision.silent"], 0)
+
+
+async def test_a_recorder_that_is_away_gets_it_later_but_not_too_late() -> None:
+    calls: Any = Calls()
+    calls.error, now = RecorderUnreachableError("gone"), [100.0]
+    incidents = Incidents(calls, lambda: now[0])
+    running = asyncio.create_task(incidents.run())
+    await is_reported_at_the_second_attempt(calls, incidents)
     calls.error = RecorderUnreachableError("gone")
     incidents.take([FAULT, of("odometry.silent")])
     now[0] += EXPIRED_S + 1
@@ -126,13 +131,7 @@ async def test_what_the_recorder_can_not_take_at_present_is_reported_again_but_n
     calls.error, now = refusal, [100.0]
     incidents = Incidents(calls, lambda: now[0])
     running = asyncio.create_task(incidents.run())
-    incidents.take([FAULT])
-    await until(calls.tried.is_set)
-    calls.error = None
-    calls.tried.clear()
-    await until(calls.tried.is_set)
-    await turns()
-    assert (calls.reported, incidents.expired) == (["vision.silent"], 0)
+    await is_reported_at_the_second_attempt(calls, incidents)
     assert caplog.messages == [f"no incident of vision.silent yet, which is tried again: {refusal}"]
     calls.error = refusal
     calls.tried.clear()
