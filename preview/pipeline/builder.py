@@ -29,7 +29,9 @@ _CLOCK_REFERENCE_EVERY: Final = 900
 """In ticks of 90 kHz: 10 ms, so that every frame has a PCR, up to 100 frames per second."""
 _SQUARE: Final = "video/x-raw(ANY),pixel-aspect-ratio=1/1"
 SOURCE_END: Final = "source_end"
-"""Last element of every source."""
+"""Last element of every source, ..."""
+SOURCE_TIME: Final = "source_time"
+"""... and the one before it, behind which a camera's time is moved to the pipeline's (capture_clock.py)."""
 _SOURCE_CAPS: Final = "source_caps"
 _TRANSPARENT: Final = frozenset({"queue", "queue2", "identity"})
 
@@ -131,8 +133,8 @@ def build_source(plan: Plan) -> Any:
     description = plan.source.description
     if plan.source.any_rate:
         description += f" ! capsfilter name={_SOURCE_CAPS}"
-    # It is also needed by descriptions that end in caps, which must be followed by an element.
-    description += f" ! identity name={SOURCE_END} single-segment=true"
+    # They are also needed by descriptions that end in caps, which must be followed by an element.
+    description += f" ! identity name={SOURCE_TIME} ! identity name={SOURCE_END} single-segment=true"
     source = _parsed(description, SOURCE_END, "src", plan.source.remedy)
     for name, values in plan.source.properties.items():
         for key, value in values.items():

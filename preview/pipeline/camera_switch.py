@@ -94,13 +94,13 @@ class Candidate:
             CameraFailedError: it fails, ends, or sends none in time.
         """
         pipeline, source = self._parts.pipeline, self.source
-        source_end = source.get_by_name(builder.SOURCE_END)
+        source_time = source.get_by_name(builder.SOURCE_TIME)
 
         def start() -> bool:
             with self._state:
                 if self._stopped:
                     return True
-                outcome = capture_clock.play_beside(pipeline, source, source_end)
+                outcome = capture_clock.play_beside(pipeline, source, source_time)
                 return bool(outcome != Gst.StateChangeReturn.FAILURE)
 
         try:

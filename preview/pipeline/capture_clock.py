@@ -11,8 +11,11 @@ was switched, rebuilt or restarted in between, until the computer restarts.
 - The offset is before the encoder: a request for a key frame travels upstream through the pads behind it, and
   GStreamer adds a pad's offset to the time of the request even where that is "at once" (1.22).
 - A camera that is started later (camera_switch.py) has a base time of its own, so that what plays at its own
-  speed counts from 0 there as well. The difference is added at the source's last element, which stamps the
-  frames anew: for everything behind it, time goes on as if nothing had been switched.
+  speed counts from 0 there as well. The difference is added in front of the source's last element, which
+  stamps the frames anew: for everything behind it, time goes on as if nothing had been switched.
+- It is the offset of a pad that sends (`src`), which then sends its segment again. One that receives applies
+  its offset to later segments only, and that of a source which isn't live may have come before the base time
+  is known.
 - v4l2src stamps a frame with the driver's time of its capture, other live sources with the time at which they
   got it; a file's frame has the time at which it is due.
 """
@@ -58,13 +61,14 @@ def play(pipeline: Any, source: Any) -> Any:
     return pipeline.set_state(Gst.State.PLAYING)
 
 
-def play_beside(pipeline: Any, source: Any, source_end: Any) -> Any:
+def play_beside(pipeline: Any, source: Any, source_time: Any) -> Any:
     """Starts another source in a pipeline that `play` has started; may block in a driver.
 
     Args:
         pipeline: the pipeline.
         source: a bin in it, whose state is locked.
-        source_end: the last element of that bin, an identity that stamps frames with their running time.
+        source_time: the last but one element of that bin; behind it, frames are stamped with their running
+            time.
 
     Returns:
         The outcome, a Gst.StateChangeReturn.
@@ -76,7 +80,7 @@ def play_beside(pipeline: Any, source: Any, source_end: Any) -> Any:
         source.get_state(_PREROLL_NS)
     base_time, pipeline_base_time = pipeline.get_pipeline_clock().get_time(), pipeline.get_base_time()
     source.set_base_time(base_time)
-    source_end.get_static_pad("sink").set_offset(base_time - pipeline_base_time)
+    source_time.get_static_pad("src").set_offset(base_time - pipeline_base_time)
     source.get_static_pad("src").set_offset(pipeline_base_time)
     return source.set_state(Gst.State.PLAYING)
 

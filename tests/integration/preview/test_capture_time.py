@@ -1,6 +1,7 @@
 """PTS is the capture time on CLOCK_MONOTONIC plus a constant, whatever happens to the pipeline."""
 
 import asyncio
+import queue
 import signal
 import statistics
 import subprocess
@@ -15,10 +16,10 @@ import pytest
 
 from bench.video.camera import Camera, camera
 from bench.video.foreign import environment
-from common.gst import Gst
+from common.gst import Gst, stop_element
 from console.client.results import StreamContainer, StreamEndpoint, StreamTransport, VideoCodec
 from omniseer.preview.v1 import preview_service_pb2 as pb
-from preview.pipeline import capture_clock
+from preview.pipeline import builder, capture_clock
 from preview.pipeline.runner import Runner
 from tests.support.film import clip
 from tests.support.judges import complaints, decoded_frames, stamps
@@ -178,6 +179,53 @@ def test_each_kind_of_source_stamps_the_capture(tmp_path: Path, name: str) -> No
         preview.enable()
         preview.running()
         plausible(preview)
+
+
+def test_a_camera_started_later_stamps_the_capture_if_its_segment_came_before() -> None:
+    """A source that isn't live sends it at once, on a thread of its own, and waits with the frames."""
+    pipeline, began_ns = Gst.Pipeline.new(), time.monotonic_ns()
+    capture_clock.use(pipeline)
+    first = builder.build_source(plan_of(LIVE))
+    later = builder.build_source(plan_of(str(SOURCES["gst, paced by itself"]["description"])))
+    later.set_locked_state(True)
+    came: queue.Queue[int] = queue.Queue()
+
+    def take(_pad: Any, info: Any) -> Any:
+        came.put(info.get_buffer().pts)
+        return Gst.PadProbeReturn.DROP
+
+    for source in (first, later):
+        pipeline.add(source)
+    first.get_static_pad("src").add_probe(Gst.PadProbeType.BUFFER, lambda *_: Gst.PadProbeReturn.DROP)
+    later.get_static_pad("src").add_probe(Gst.PadProbeType.BUFFER, take)
+    try:
+        capture_clock.play(pipeline, first)
+        wait_until(lambda: time.monotonic_ns() - began_ns > 10**9, "the pipeline's time is not the source's")
+        capture_clock.play_beside(
+            _AfterItsSegment(pipeline, later), later, later.get_by_name(builder.SOURCE_TIME)
+        )
+        began_later_ns = later.get_base_time() - pipeline.get_base_time()
+        assert [came.get(timeout=20) for _ in range(3)] == [
+            began_later_ns + due_ms * 1_000_000 for due_ms in (0, 40, 80)
+        ]
+    finally:
+        stop_element(later)
+        stop_element(pipeline)
+
+
+class _AfterItsSegment:
+    """A pipeline whose time is asked for when a source in it has passed on its segment."""
+
+    def __init__(self, pipeline: Any, source: Any) -> None:
+        self._pipeline = pipeline
+        self._pad = source.get_by_name(builder.SOURCE_END).get_static_pad("sink")
+
+    def get_pipeline_clock(self) -> Any:
+        wait_until(lambda: self._pad.get_sticky_event(Gst.EventType.SEGMENT, 0) is not None, "its segment")
+        return self._pipeline.get_pipeline_clock()
+
+    def get_base_time(self) -> int:
+        return int(self._pipeline.get_base_time())
 
 
 @pytest.mark.timed
