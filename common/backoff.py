@@ -1,5 +1,15 @@
 """Exponential backoff: the growing pauses between attempts at something that keeps failing."""
 
+from typing import Final
+
+_LARGEST_EXPONENT: Final = 64
+"""Failures go on for ever, and powers need not."""
+
+
+def pause_s(failures: int, first_s: float, longest_s: float, factor: float = 2.0) -> float:
+    """Returns the pause after so many failures in succession, in seconds; arguments as of `Backoff`."""
+    return min(longest_s, first_s * factor ** min(failures - 1, _LARGEST_EXPONENT))
+
 
 class Backoff:
     """Pauses that grow by a constant factor with each failure, up to a limit.
@@ -14,21 +24,17 @@ class Backoff:
     """
 
     def __init__(self, first_s: float, longest_s: float, factor: float = 2.0) -> None:
-        self._first_s = min(first_s, longest_s)
+        self._first_s = first_s
         self._longest_s = longest_s
         self._factor = factor
-        self._pause_s = self._first_s
         self.failures = 0
         """Failures since the last success."""
 
     def next_s(self) -> float:
         """Counts a failure and returns the pause before the next attempt, in seconds."""
         self.failures += 1
-        pause_s = self._pause_s
-        self._pause_s = min(pause_s * self._factor, self._longest_s)
-        return pause_s
+        return pause_s(self.failures, self._first_s, self._longest_s, self._factor)
 
     def reset(self) -> None:
         """Starts again from the first pause, after a success."""
         self.failures = 0
-        self._pause_s = self._first_s

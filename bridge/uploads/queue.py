@@ -15,6 +15,8 @@ from enum import Enum, IntEnum
 from types import MappingProxyType
 from typing import Final, Protocol
 
+from common.backoff import pause_s
+
 MOST_WAITING: Final = 1000
 """Recordings in the queue; a further one is refused, or takes the place of a less urgent one."""
 MOST_KEPT: Final = 10_000
@@ -256,13 +258,8 @@ def progressed(upload: Upload, bytes_done: int) -> Upload:
 def _failed(upload: Upload, reason: str, now_s: float) -> Upload:
     """Returns the upload after a failure of this recording."""
     failures = upload.failures + 1
-    return replace(upload, reason=reason, failures=failures, due_s=now_s + pause_s(failures))
-
-
-def pause_s(failures: int) -> float:
-    """Returns the pause after so many failures in succession, in seconds: 1, 2, 4 ... 300."""
-    # The exponent is bounded: failures go on for ever, and powers of 2 need not.
-    return float(min(LONGEST_PAUSE_S, FIRST_PAUSE_S * 2 ** min(failures - 1, 16)))
+    due_s = now_s + pause_s(failures, FIRST_PAUSE_S, LONGEST_PAUSE_S)
+    return replace(upload, reason=reason, failures=failures, due_s=due_s)
 
 
 def next_upload(uploads: Iterable[Upload], now_s: float, *, path_works: bool = True) -> Upload | None:

@@ -1,6 +1,9 @@
 """The pauses between attempts."""
 
-from common.backoff import Backoff
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.backoff import Backoff, pause_s
 
 
 def test_pauses_grow_up_to_the_limit_and_failures_are_counted() -> None:
@@ -24,3 +27,8 @@ def test_the_first_pause_is_no_longer_than_the_limit() -> None:
 def test_endless_failures_do_not_overflow() -> None:
     backoff = Backoff(first_s=0.1, longest_s=1.0)
     assert [backoff.next_s() for _ in range(5000)][-1] == 1.0
+
+
+@given(st.integers(min_value=1, max_value=10**9))
+def test_pauses_never_shrink_and_stay_within_their_limits(failures: int) -> None:
+    assert 1 <= pause_s(failures, 1.0, 300.0) <= pause_s(failures + 1, 1.0, 300.0) <= 300

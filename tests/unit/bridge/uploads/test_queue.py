@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.uploads.queue import (
-    LONGEST_PAUSE_S,
     MOST_CUTS,
     RUNNING,
     TRANSITIONS,
@@ -19,7 +18,6 @@ from bridge.uploads.queue import (
     Upload,
     in_order,
     next_upload,
-    pause_s,
     progressed,
     step,
 )
@@ -81,12 +79,6 @@ def test_failures_of_its_own_are_counted_and_pause_it_longer_each_time() -> None
     assert (cut.state, cut.reason, cut.failures, cut.due_s) == (State.FAILED, "no network", 3, 0.0)
 
 
-@given(st.integers(min_value=1, max_value=10**9))
-def test_pauses_stay_within_one_and_three_hundred_seconds(failures: int) -> None:
-    assert 1 <= pause_s(failures) <= LONGEST_PAUSE_S
-    assert pause_s(failures) <= pause_s(failures + 1)
-
-
 @given(st.lists(st.sampled_from(Event), max_size=40))
 def test_no_sequence_of_events_ends_outside_the_table(events: list[Event]) -> None:
     upload = UPLOAD
@@ -126,7 +118,7 @@ def test_cuts_in_succession_without_progress_are_a_failure_of_the_recording() ->
         upload = step(step(upload, Event.RESUME, 100.0), Event.BEGIN, 100.0)
     for failures in (1, 2, 3):
         failed = step(upload, Event.CUT, 100.0, "cut")
-        assert (failed.failures, failed.due_s) == (failures, 100.0 + pause_s(failures))
+        assert (failed.failures, failed.due_s) == (failures, 100.0 + 2 ** (failures - 1))
         upload = step(step(failed, Event.RESUME, 200.0), Event.BEGIN, 200.0)
 
 
