@@ -113,6 +113,7 @@ def _queue(
     if settings.hub.receipts is None:
         return None
     # Late: a robot that uploads nothing does without the memory of their libraries.
+    from bridge.uploads.kept_queue import KeptQueue  # noqa: PLC0415
     from bridge.uploads.uploads import Fleet, Uploads  # noqa: PLC0415
     from fleet.receipt_keys import read_public_keys  # noqa: PLC0415
 
@@ -122,12 +123,11 @@ def _queue(
     return Uploads(
         settings.uploads,
         fleet,
-        store=StoredUploads(kept),
+        queue=KeptQueue(StoredUploads(kept), changes.notify_all, most_kept=most_kept(kept.max_bytes)),
         source=gateway,
         hub=hub,
         charging=lambda: is_charging(status.current),
         changed=changes.notify_all,
-        most_kept=most_kept(kept.max_bytes),
     )
 
 

@@ -99,9 +99,9 @@ class QueuedUploads:
     def describe(self, status: cloud_pb2.CloudStatus) -> None:
         """Writes the fields about uploads into a status."""
         uploads = self._uploads
-        status.uploads_waiting = len(uploads.waiting)
-        status.uploads_left_out = uploads.left_out
-        status.uploads_paused = uploads.disk_error or uploads.paused
+        status.uploads_waiting = len(uploads.queue.waiting)
+        status.uploads_left_out = uploads.queue.left_out.count
+        status.uploads_paused = uploads.queue.disk_error or uploads.paused
         if current := uploads.current:
             status.uploading_id = current.recording_id
             status.uploading.CopyFrom(_copy(current))
@@ -119,17 +119,17 @@ class QueuedUploads:
                 size=each.size,
                 bytes_per_s=self._uploads.bytes_per_s if each is current else 0,
             )
-            for each in self._uploads.waiting
+            for each in self._uploads.queue.waiting
         ]
 
     def copies(self) -> Sequence[bridge_pb.CopyReport]:
         """Returns the copies that the recorder is to know: over some reports, all that it may not have."""
-        uploads = self._uploads
-        waiting = uploads.waiting
+        queue = self._uploads.queue
+        waiting = queue.waiting
         present = [each for each in waiting if each.state in _PRESENT][:_MOST_PRESENT]
-        turn = map(uploads.get, uploads.unconfirmed.next(MOST_COPIES - len(present)))
+        turn = map(queue.get, queue.unconfirmed.next(MOST_COPIES - len(present)))
         chosen = {each.recording_id: each for each in (*present, *turn) if each}
-        for each in (*waiting, *uploads.settled):
+        for each in (*waiting, *queue.settled):
             if len(chosen) == MOST_COPIES:
                 break
             chosen.setdefault(each.recording_id, each)
@@ -162,12 +162,12 @@ async def apply_rule(uploads: "Uploads", gateway: GatewayCalls) -> None:
     while True:
         try:
             token = ""
-            uploads.begin_listing()
+            uploads.queue.begin_listing()
             for _ in range(_MOST_PAGES):
                 page = await gateway.list_recordings(_PAGE, token)
                 await uploads.consider(page.recordings)
                 if not (token := page.next_page_token):
-                    uploads.end_listing()
+                    uploads.queue.end_listing()
                     break
         except GatewayError as error:
             _log.info("the robot's recordings can't be listed: %s", error)

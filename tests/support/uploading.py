@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from bridge.uploads.attempt import RecordingSource
 from bridge.uploads.config import UploadSettings
+from bridge.uploads.kept_queue import KeptQueue
 from bridge.uploads.queue import MOST_KEPT, Upload
 from bridge.uploads.receivers import Requests
 from bridge.uploads.uploads import Fleet, Uploads
@@ -171,7 +172,7 @@ class Running:
         return next(
             (
                 each
-                for each in (*self.uploads.waiting, *self.uploads.settled)
+                for each in (*self.uploads.queue.waiting, *self.uploads.queue.settled)
                 if each.recording_id == recording_id
             ),
             None,
@@ -208,19 +209,18 @@ async def running_uploads(
         Uploads(
             UploadSettings.model_validate({"store_hosts": (host,), "insecure_store": True} | settings),
             Fleet(fleet=FLEET, robot=ROBOT, keys=keys),
-            store=rows,
+            queue=KeptQueue(rows, changed, most_kept=most_kept),
             source=robot,
             hub=hub,
             charging=charging,
             changed=changed,
-            most_kept=most_kept,
         ),
         rows,
     )
     stop = asyncio.Event()
     task = asyncio.create_task(running.uploads.run(stop))
     try:
-        await running.uploads.loaded.wait()
+        await running.uploads.queue.loaded.wait()
         yield running
         assert not task.done(), "it runs until it is stopped"
     finally:

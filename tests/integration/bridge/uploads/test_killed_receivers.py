@@ -84,7 +84,7 @@ async def check_while_it_runs(ground: Ground, running: Running, expected: dict[s
     """Asserts at each look that what the robot holds for verified is so."""
     verified: set[str] = set()
     while len(verified) < len(expected):
-        upload = {each.recording_id: each.state for each in running.uploads.settled}
+        upload = {each.recording_id: each.state for each in running.uploads.queue.settled}
         new = {name for name, state in upload.items() if state is State.VERIFIED} - verified
         if new:
             count = await asyncio.to_thread(assert_only_what_is_right_counts, ground, expected)

@@ -269,7 +269,7 @@ async def test_without_a_receiver_it_waits_and_says_so(ground: Ground) -> None:
         cancelled = await running.uploads.cancel("one")
         assert cancelled.state is not State.VERIFIED
         await running.uploads.consider(robot.recordings.values())
-        assert not running.uploads.waiting, "what was cancelled is not queued again by a rule"
+        assert not running.uploads.queue.waiting, "what was cancelled is not queued again by a rule"
 
 
 async def test_the_rule_queues_in_order_and_the_most_urgent_goes_first(ground: Ground) -> None:
@@ -290,7 +290,7 @@ async def test_the_rule_queues_in_order_and_the_most_urgent_goes_first(ground: G
         robot, ground.hub, ground.proxy.host, ground.keys, rows, rule="all", only_while_charging=True
     ) as running:
         await running.uploads.consider(robot.recordings.values())
-        order = [each.recording_id for each in running.uploads.waiting]
+        order = [each.recording_id for each in running.uploads.queue.waiting]
     assert order == ["incident", "pinned", "other-old", "bundle", "other-new"]
     # The next run finds them on the disk.
     async with (
@@ -299,11 +299,11 @@ async def test_the_rule_queues_in_order_and_the_most_urgent_goes_first(ground: G
     ):
         for name in order:
             await running.until(name, is_in(State.VERIFIED))
-        assert [each.recording_id for each in reversed(running.uploads.settled)] == order
+        assert [each.recording_id for each in reversed(running.uploads.queue.settled)] == order
         # A folder of experiments has grown: what is new is sent, too.
         robot.add("bundle", {"data.bin": b"bundle", "more.bin": b"more"}, kind=wire.RECORDING_KIND_RUN_BUNDLE)
         await running.uploads.consider(robot.recordings.values())
-        assert [each.recording_id for each in running.uploads.waiting] == ["bundle"]
+        assert [each.recording_id for each in running.uploads.queue.waiting] == ["bundle"]
         await running.until("bundle", is_in(State.VERIFIED))
 
 

@@ -45,7 +45,7 @@ async def cancel_while_held(running: Running, rows: SlowRows) -> None:
     """Cancels the upload while its row is being written, and gives what follows some ticks' time."""
 
     async def is_gone() -> bool:
-        return not running.uploads.waiting
+        return not running.uploads.queue.waiting
 
     await rows.held.wait()
     cancelling = asyncio.create_task(running.uploads.cancel("one"))

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from bridge.uploading import QueuedUploads
-from bridge.uploads import uploads
+from bridge.uploads import kept_queue
 from bridge.uploads.queue import Priority, State, Upload
 from common.errors import NotFoundError, TooMuchError
 from console.client.results import Recording, RecordingCopyState, RecordingKind
@@ -21,7 +21,7 @@ PLACES = 5
 
 @pytest.fixture(autouse=True)
 def _few_places(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(uploads, "MOST_WAITING", PLACES)
+    monkeypatch.setattr(kept_queue, "MOST_WAITING", PLACES)
 
 
 def robot_with(count: int) -> Robot:
@@ -52,10 +52,10 @@ def closed(robot: Robot, rows: Rows | None = None, rule: str = "all") -> Any:
 async def listed(running: Running, robot: Robot) -> None:
     """The recorder's list is read, the newest first, in pages of two."""
     newest_first = sorted(robot.recordings.values(), key=lambda each: -each.started_unix_ms)
-    running.uploads.begin_listing()
+    running.uploads.queue.begin_listing()
     for page in pages(newest_first):
         await running.uploads.consider(page)
-    running.uploads.end_listing()
+    running.uploads.queue.end_listing()
 
 
 def pages(recordings: list[Recording]) -> Iterable[list[Recording]]:
@@ -63,7 +63,7 @@ def pages(recordings: list[Recording]) -> Iterable[list[Recording]]:
 
 
 def waiting(running: Running) -> list[str]:
-    return [each.recording_id for each in running.uploads.waiting]
+    return [each.recording_id for each in running.uploads.queue.waiting]
 
 
 async def test_an_incident_takes_the_place_of_the_last_one() -> None:
@@ -77,12 +77,12 @@ async def test_an_incident_takes_the_place_of_the_last_one() -> None:
         await listed(running, robot)
         assert waiting(running) == ["incident", "rec-00", "rec-01", "rec-02", "rec-03"]
         assert rows.rows.keys() == set(waiting(running)), "also after a restart"
-        assert running.uploads.left_out == 1
+        assert running.uploads.queue.left_out.count == 1
         # The one without a place is the next to get one.
         await running.uploads.cancel("rec-01")
         await listed(running, robot)
         assert waiting(running) == ["incident", "rec-00", "rec-02", "rec-03", "rec-04"]
-        assert running.uploads.left_out == 0
+        assert running.uploads.queue.left_out.count == 0
 
 
 async def test_the_places_are_of_the_oldest_on_whatever_page_they_are() -> None:
@@ -92,12 +92,12 @@ async def test_the_places_are_of_the_oldest_on_whatever_page_they_are() -> None:
         for _ in range(2):
             await listed(running, robot)
             assert waiting(running) == [f"rec-{number:02}" for number in range(PLACES)]
-            assert running.uploads.left_out == 2 * PLACES
+            assert running.uploads.queue.left_out.count == 2 * PLACES
         assert rows.rows.keys() == set(waiting(running))
 
 
 async def test_what_has_no_place_is_reported_once(caplog: pytest.LogCaptureFixture) -> None:
-    caplog.set_level(logging.INFO, "bridge.uploads.uploads")
+    caplog.set_level(logging.INFO, "bridge.uploads.kept_queue")
     robot = robot_with(PLACES + 1)
     status = cloud_pb2.CloudStatus()
     async with closed(robot) as running:
@@ -108,7 +108,7 @@ async def test_what_has_no_place_is_reported_once(caplog: pytest.LogCaptureFixtu
         robot.delete("rec-05")
         for _ in range(3):
             await listed(running, robot)
-        assert running.uploads.left_out == 0
+        assert running.uploads.queue.left_out.count == 0
     reports = [each.message for each in caplog.records if "place" in each.message]
     assert len(reports) == 2
     assert reports[0] == "1 recordings are to be copied and find no place: 5 wait already"
@@ -142,7 +142,7 @@ async def test_a_run_bundle_that_was_requested_by_hand_keeps_its_place() -> None
             add(robot, f"incident-{number}", 50 + number, RecordingKind.INCIDENT)
         await listed(running, robot)
         assert waiting(running) == [*(f"incident-{number}" for number in range(PLACES - 1)), "run-2"]
-        assert running.uploads.left_out == PLACES - 1 + 1
+        assert running.uploads.queue.left_out.count == PLACES - 1 + 1
         # A further request by hand has no place before it, and learns of that.
         add(robot, "rec-9", 1)
         with pytest.raises(TooMuchError, match="5 recordings wait"):
@@ -171,7 +171,7 @@ async def test_one_without_a_place_can_be_cancelled() -> None:
         assert (await running.uploads.cancel("rec-05")).state is State.QUEUED
         assert rows.rows["rec-05"].state is State.LOCAL
         await listed(running, robot)
-        assert running.uploads.left_out == 0
+        assert running.uploads.queue.left_out.count == 0
         with pytest.raises(NotFoundError):
             await running.uploads.cancel("rec-05")
 
@@ -190,11 +190,11 @@ async def test_a_verified_one_that_has_changed_waits_for_a_place() -> None:
         for _ in range(2):
             await listed(running, robot)
             assert "grown" not in waiting(running)
-            assert running.uploads.left_out == 1
+            assert running.uploads.queue.left_out.count == 1
         await running.uploads.cancel("rec-00")
         await listed(running, robot)
         assert "grown" in waiting(running)
-        assert running.uploads.left_out == 0
+        assert running.uploads.queue.left_out.count == 0
 
 
 async def test_what_was_asked_for_by_hand_is_so_again_after_it_had_no_place() -> None:

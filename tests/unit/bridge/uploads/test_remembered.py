@@ -9,7 +9,7 @@ import pytest
 from bridge.outbox.outbox import outbox
 from bridge.outbox.uploads import StoredUploads, _row, most_kept
 from bridge.uploading import QueuedUploads
-from bridge.uploads import uploads
+from bridge.uploads import kept_queue, uploads
 from bridge.uploads.queue import State, Upload
 from bridge.values import Event, Position
 from console.client.results import RecordingCopyState
@@ -62,7 +62,7 @@ async def test_an_outbox_that_has_more_rows_than_it_remembers_is_emptied_at_the_
     async with outbox(tmp_path, _SMALLEST) as small:
         store, most = StoredUploads(small), most_kept(_SMALLEST)
         async with closed(robot_with("w"), store, most) as running:
-            assert len(running.uploads.settled) == most
+            assert len(running.uploads.queue.settled) == most
         kept = await store.uploads()
         assert sum(each.state is State.VERIFIED for each in kept) == most
         assert any(each.recording_id == "w" for each in kept)
@@ -86,7 +86,7 @@ async def test_a_full_outbox_forgets_before_it_remembers() -> None:
     rows.rows = rows_with(a=State.VERIFIED, b=State.VERIFIED, c=State.QUEUED).rows
     async with closed(robot, rows, most_kept=2) as running:
         await running.uploads.cancel("without-place")
-        assert running.uploads.disk_error == ""
+        assert running.uploads.queue.disk_error == ""
     assert rows.rows.keys() == {"b", "c", "without-place"}
 
 
@@ -113,9 +113,9 @@ def known(robot: Robot, name: str, state: RecordingCopyState) -> None:
 
 async def listed(running: Running, robot: Robot) -> None:
     """The recorder's list is read."""
-    running.uploads.begin_listing()
+    running.uploads.queue.begin_listing()
     await running.uploads.consider(list(robot.recordings.values()))
-    running.uploads.end_listing()
+    running.uploads.queue.end_listing()
 
 
 async def test_a_copy_is_remembered_until_the_recorder_knows_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -131,7 +131,7 @@ async def test_a_copy_is_remembered_until_the_recorder_knows_it(monkeypatch: pyt
         await running.until("new", lambda each: each and each.state is State.VERIFIED)
         for _ in range(2):
             await listed(running, robot)
-            assert running.uploads.waiting == []
+            assert running.uploads.queue.waiting == []
             reports = QueuedUploads(running.uploads).copies()
             states = {each.recording_id: each.copy.state for each in reports}
             assert states["new"] == RECORDING_COPY_STATE_VERIFIED
@@ -142,9 +142,9 @@ async def test_a_copy_is_remembered_until_the_recorder_knows_it(monkeypatch: pyt
         known(robot, "next", RecordingCopyState.UNKNOWN)
         await listed(running, robot)
         await running.until("next", lambda each: each and each.state is State.VERIFIED)
-        assert running.uploads.get("new") is None
+        assert running.uploads.queue.get("new") is None
         await listed(running, robot)
-        assert running.uploads.waiting == []
+        assert running.uploads.queue.waiting == []
     assert rows.rows.keys() == {"a", "b", "c", "next"}
 
 
@@ -153,10 +153,12 @@ async def test_of_copies_that_the_recorder_never_knows_not_all_are_remembered(
 ) -> None:
     """Those of run bundles, of which it keeps no state."""
     monkeypatch.setattr(uploads, "Attempt", _Copied)
-    monkeypatch.setattr(uploads, "_MOST_UNCONFIRMED", 2)
+    monkeypatch.setattr(kept_queue, "_MOST_UNCONFIRMED", 2)
     robot = robot_with(*(f"run-{number}" for number in range(6)))
     async with copying(robot, Rows(), most_kept=3) as running:
         for number in range(6):
             await running.uploads.enqueue(f"run-{number}")
             await running.until(f"run-{number}", lambda each: each and each.state is State.VERIFIED)
-        assert {each.recording_id for each in running.uploads.settled} == {f"run-{n}" for n in range(1, 6)}
+        assert {each.recording_id for each in running.uploads.queue.settled} == {
+            f"run-{n}" for n in range(1, 6)
+        }

@@ -118,7 +118,7 @@ async def test_a_backlog_of_300_reaches_the_recorder(state: State) -> None:
         assert before not in recorder.states()
         # What has arrived is not written again and again.
         await listed(running, recorder)
-        assert len(running.uploads.unconfirmed) == 0
+        assert len(running.uploads.queue.unconfirmed) == 0
         writes = recorder.writes
         for _ in range(2 * BACKLOG // MOST_COPIES):
             await gateway.take()
@@ -156,9 +156,9 @@ async def test_a_recording_that_the_list_lacks_is_not_reported_for_ever() -> Non
     async with running_uploads(
         robot, hub, "127.0.0.1:9", (), rows_of(State.QUEUED), only_while_charging=True
     ) as running:
-        assert len(running.uploads.unconfirmed) == BACKLOG
+        assert len(running.uploads.queue.unconfirmed) == BACKLOG
         await listed(running, recorder)
-        assert len(running.uploads.unconfirmed) == 0
+        assert len(running.uploads.queue.unconfirmed) == 0
 
 
 async def test_a_list_that_breaks_off_confirms_nothing_that_it_does_not_show() -> None:
@@ -174,4 +174,4 @@ async def test_a_list_that_breaks_off_confirms_nothing_that_it_does_not_show() -
         robot, hub, "127.0.0.1:9", (), rows_of(State.QUEUED), only_while_charging=True
     ) as running:
         await listed(running, recorder)
-        assert len(running.uploads.unconfirmed) == BACKLOG
+        assert len(running.uploads.queue.unconfirmed) == BACKLOG

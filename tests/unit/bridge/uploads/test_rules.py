@@ -38,7 +38,7 @@ async def test_a_rule_queues_what_it_names(rule: str, queued: set[str]) -> None:
     settings: dict[str, Any] = {"rule": rule, "only_while_charging": True}
     async with running_uploads(robot, HUB, "127.0.0.1:9", (), Rows(), **settings) as running:
         await running.uploads.consider(robot.recordings.values())
-        waiting = {each.recording_id: each.priority for each in running.uploads.waiting}
+        waiting = {each.recording_id: each.priority for each in running.uploads.queue.waiting}
     assert waiting.keys() == queued
     assert Priority.BY_HAND not in waiting.values()
 
@@ -54,5 +54,5 @@ async def test_a_copied_recording_that_the_robot_can_not_read_is_not_queued_agai
     settings: dict[str, Any] = {"rule": rule, "only_while_charging": True}
     async with running_uploads(robot, HUB, "127.0.0.1:9", (), rows, **settings) as running:
         await running.uploads.consider(robot.recordings.values())
-        assert [each.recording_id for each in running.uploads.waiting] == ["cut"]
+        assert [each.recording_id for each in running.uploads.queue.waiting] == ["cut"]
         assert (await running.uploads.enqueue("unread")).state is State.VERIFIED
