@@ -135,11 +135,6 @@ class Cloud:
         if self.copies and now.cloud:
             self.copies.take(now.cloud, now.recorder)
 
-    def bridge_run(self) -> str:
-        """Returns the ID of the bridge's run; empty while it does not answer."""
-        newest = self.link.view.newest
-        return newest.instance_id if newest else ""
-
 
 @dataclass(frozen=True, slots=True)
 class Gateway:
@@ -217,7 +212,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
             recording.calls if recording else None,
             exports,
             cloud.uploads if cloud else None,
-            cloud.bridge_run if cloud else str,
+            cloud.link if cloud else None,
         ),
     )
     interceptors = Interceptors(
@@ -286,7 +281,7 @@ def _teleop(
     return Teleop(
         link,
         commands,
-        lambda: preview.view,
+        preview,
         line_of_sight=driving.line_of_sight,
         episodes=episodes,
     )

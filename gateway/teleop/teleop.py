@@ -19,8 +19,7 @@ import asyncio
 import logging
 import secrets
 import time
-from collections.abc import Callable
-from typing import Final, NoReturn
+from typing import Final, NoReturn, Protocol
 
 from common.errors import ConflictError, DriveUnreachableError, PreconditionError, TooMuchError
 from common.reasons import Reason
@@ -62,13 +61,21 @@ _SESSION_ID_BYTES: Final = 12
 _NS_PER_MS: Final = 1_000_000
 
 
+class Preview(Protocol):
+    """The robot's preview."""
+
+    @property
+    def view(self) -> PreviewView:
+        """Its state."""
+
+
 class Teleop:
     """The lease, the commands and the stops of one robot. Used on one event loop.
 
     Args:
         link: to the drive program.
         commands: what it is sent beside the desired state.
-        preview: returns the state of the preview.
+        preview: whose pictures the drivers see.
         line_of_sight: whether driving without a picture is permitted.
         episodes: records times of motion, for which it needs to know who drives.
 
@@ -81,7 +88,7 @@ class Teleop:
         self,
         link: DriveLink,
         commands: DriveCommands,
-        preview: Callable[[], PreviewView],
+        preview: Preview,
         *,
         line_of_sight: bool,
         episodes: Episodes,
@@ -237,7 +244,7 @@ class Teleop:
             if silent := self._lease.silent(time.monotonic()):
                 self._end(silent, silent.ended or LeaseEnd.LOST)
             if checks % _PICTURE_EVERY == 0:
-                self._commands.picture(self._preview().newest_capture_ns(time.monotonic_ns()))
+                self._commands.picture(self._preview.view.newest_capture_ns(time.monotonic_ns()))
 
     async def follow(self) -> NoReturn:
         """Follows the drive program: a stop that it confirms late, and the lease, granted to each process."""

@@ -34,6 +34,11 @@ class BridgeLink(ServiceWatch[BridgeClient, BridgeReport]):
         self._clock = clock
         self.view = CloudView("not connected yet", clock())
 
+    @property
+    def run_id(self) -> str:
+        """ID of the bridge's run; empty while it does not answer."""
+        return self.view.newest.instance_id if self.view.newest else ""
+
     def _record(self, report: BridgeReport) -> bool:
         before = self.view
         self.view = before.reported(report, self._clock())

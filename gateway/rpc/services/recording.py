@@ -1,7 +1,7 @@
 """Recordings: passed on to the recorder, which owns them and answers; their copies, to the bridge."""
 
-from collections.abc import AsyncIterator, Callable
-from typing import Final
+from collections.abc import AsyncIterator
+from typing import Final, Protocol
 
 from google.protobuf.message import Message
 
@@ -32,6 +32,14 @@ from omniseer.gateway.v1.recording_pb2 import (
 )
 
 
+class Bridge(Protocol):
+    """The robot's bridge."""
+
+    @property
+    def run_id(self) -> str:
+        """ID of its run; empty while it does not answer."""
+
+
 class RecordingService:
     """Handlers of recordings. Requests come here valid, and responses leave as the recorder made them.
 
@@ -39,7 +47,7 @@ class RecordingService:
         calls: to the recorder; None where the robot is not set up for recording.
         exports: passes the bytes of files on.
         uploads: to the bridge; None where the robot is not set up for a fleet.
-        bridge_run: ID of the bridge's run; empty where no bridge answers.
+        bridge: to know its calls by; None where the robot is not set up for a fleet.
     """
 
     def __init__(
@@ -47,12 +55,12 @@ class RecordingService:
         calls: RecorderCalls | None,
         exports: ExportStream,
         uploads: Uploads | None,
-        bridge_run: Callable[[], str] = str,
+        bridge: Bridge | None = None,
     ) -> None:
         self._calls = calls
         self._exports = exports
         self._uploads = uploads
-        self._bridge_run = bridge_run
+        self._bridge = bridge
 
     async def start_recording(self, request: StartRecordingRequest, call: CallContext) -> bytes:
         """Returns when the first file is open."""
@@ -123,7 +131,8 @@ class RecordingService:
         return CancelUploadResponse(message=f"{ended.recording_id} {what}")
 
     def _rank(self, call: CallContext) -> Rank:
-        if bridge_run.is_of(self._bridge_run(), call.rpc.invocation_metadata() or ()):
+        run_id = self._bridge.run_id if self._bridge else ""
+        if bridge_run.is_of(run_id, call.rpc.invocation_metadata() or ()):
             return Rank.BRIDGE
         operates = call.principal is None or call.principal.role.may(Role.OPERATOR)
         return Rank.OPERATOR if operates else Rank.VIEWER

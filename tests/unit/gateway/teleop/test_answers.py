@@ -55,12 +55,14 @@ class Sink:
         raise AssertionError(action)
 
 
-def preview() -> PreviewView:
-    raise AssertionError("it is reported while the gateway runs")
+class Preview:
+    @property
+    def view(self) -> PreviewView:
+        raise AssertionError("it is reported while the gateway runs")
 
 
 def teleop(drive: Any) -> Teleop:
-    return Teleop(drive, drive, preview, line_of_sight=True, episodes=Episodes(Sink()))
+    return Teleop(drive, drive, Preview(), line_of_sight=True, episodes=Episodes(Sink()))
 
 
 @pytest.mark.parametrize("enabled", [True, False])
