@@ -13,7 +13,7 @@ from recorder.lifecycle import State
 from recorder.rpc.file_pages import FilePage, file_page
 from recorder.status_reader import StatusReader
 from recorder.store.manifest import Copy, CopyState, Kind, Manifest, RecordingState, StopReason
-from recorder.store.run_bundles import Bundle
+from recorder.store.run_bundles import Bundle, BundleSummary
 from recorder.values import Gap, GapCause
 
 STATES: Final[Mapping[State, pb.RecorderState.ValueType]] = MappingProxyType(
@@ -132,7 +132,7 @@ def bundle_page(found: Bundle, page: FilePage, sums: Mapping[str, bytes]) -> pb.
     return pb.GetRecordingResponse(recording=message, next_page_token=page.next_token)
 
 
-def bundle(found: Bundle) -> pb.Recording:
+def bundle(found: BundleSummary) -> pb.Recording:
     """Returns the message of a run bundle, without its files."""
     final = found.final
     message = pb.Recording(
@@ -145,7 +145,7 @@ def bundle(found: Bundle) -> pb.Recording:
         ended_unix_ms=found.ended_ns // _NS_PER_MS if final else 0,
         duration_ms=(found.ended_ns - found.began_ns) // _NS_PER_MS,
         size=found.size,
-        file_count=len(found.files),
+        file_count=found.file_count,
     )
     if found.state is RecordingState.RECOVERED:
         message.stop_reason = pb.RECORDING_STOP_REASON_INTERRUPTED

@@ -23,7 +23,7 @@ from recorder.status_reader import StatusReader
 from recorder.store.bundle_reader import BundleReader
 from recorder.store.manifest import Manifest
 from recorder.store.readers import Readers
-from recorder.store.run_bundles import Bundle, RunBundles
+from recorder.store.run_bundles import Bundle, BundleSummary, RunBundles
 from recorder.store.sums import Sums
 from recorder.thumbnail import find_thumbnail
 
@@ -125,7 +125,7 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         self, request: pb.ListRecordingsRequest, _context: grpc.aio.ServicerContext[Any, Any]
     ) -> pb.ListRecordingsResponse:
         """Returns a page of the list."""
-        listed: list[Manifest | Bundle] = [*self._status_reader.recordings, *await self._bundles.all()]
+        listed: list[Manifest | BundleSummary] = [*self._status_reader.recordings, *await self._bundles.all()]
         listed.sort(key=_place, reverse=True)
         if request.page_token:
             listed = _after(listed, request.page_token)
@@ -212,8 +212,8 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
     def _recording_of(self, result: Result) -> pb.Recording | None:
         return mapping.recording(self._status_reader, result.recording) if result.recording else None
 
-    def _message(self, each: Manifest | Bundle) -> pb.Recording:
-        if isinstance(each, Bundle):
+    def _message(self, each: Manifest | BundleSummary) -> pb.Recording:
+        if isinstance(each, BundleSummary):
             return mapping.bundle(each)
         return self._messages.of(self._status_reader, each)
 
@@ -243,15 +243,15 @@ def _caller(context: grpc.aio.ServicerContext[Any, Any]) -> str:
     return str(metadata(context, _CALLER))[:_LONGEST_CALLER]
 
 
-def _place(each: Manifest | Bundle) -> tuple[int, str]:
+def _place(each: Manifest | BundleSummary) -> tuple[int, str]:
     return each.started_unix_ms, each.id
 
 
-def _token(last: Manifest | Bundle) -> str:
+def _token(last: Manifest | BundleSummary) -> str:
     return f"{last.started_unix_ms}.{last.id}"
 
 
-def _after(listed: list[Manifest | Bundle], token: str) -> list[Manifest | Bundle]:
+def _after(listed: list[Manifest | BundleSummary], token: str) -> list[Manifest | BundleSummary]:
     """Returns those that follow on the page before, even if its last one has been deleted meanwhile."""
     instant, dot, last = token.partition(".")
     if not (dot and instant.isascii() and instant.isdigit() and last):

@@ -10,13 +10,13 @@ from common.open_file import UnreadableError
 from common.reader_threads import ReaderThreads
 from common.reasons import Reason
 from common.tasks import cancel
-from recorder.store.run_bundles import Bundle, BundleFile, RunBundles
+from recorder.store.run_bundles import Bundle, BundleFile, BundleSummary, RunBundles
 from recorder.store.sums import FileState, Sums
 
 LISTED_ANEW_S: Final = 2.0
 """After that the folders are read again for a list."""
 ANSWER_WITHIN_S: Final = 2.0
-"""What has not been read by then has no sum in the answer; the gateway waits for 5 s."""
+"""What has not been read by then is not in the answer; the gateway waits for 5 s."""
 MOST_AT_ONCE: Final = 4
 """Bundles whose files are read."""
 _RETRY_AFTER_S: Final = 10.0
@@ -26,8 +26,8 @@ _RETRY_AFTER_S: Final = 10.0
 class BundleReader:
     """Reads run bundles; used on one event loop.
 
-    The files of a bundle that was asked for are read to their end, whether or not the caller waits: the next
-    one gets the sums at once.
+    The folders, and the files of a bundle that was asked for, are read to their end, whether or not the
+    caller waits: the next one gets the list, or the sums, at once.
 
     Args:
         bundles: where they are.
@@ -47,19 +47,39 @@ class BundleReader:
         self._threads = threads
         self._sums = sums
         self._clock = clock
-        self._listing = asyncio.Lock()
-        self._listed: Sequence[Bundle] = ()
+        self._listing: asyncio.Task[None] | None = None
+        self._listing_began_s = 0.0
+        self._listed: Sequence[BundleSummary] | None = None
         self._listed_s = float("-inf")
         self._reading: dict[str, asyncio.Task[None]] = {}
         """By ID of the bundle."""
 
-    async def all(self) -> Sequence[Bundle]:
-        """Returns all bundles, as they were at most LISTED_ANEW_S ago, without those that can't be read."""
-        async with self._listing:
-            if self._clock() - self._listed_s > LISTED_ANEW_S:
-                self._listed = await self._threads.run(self._bundles.all)
-                self._listed_s = self._clock()
-            return self._listed
+    async def all(self) -> Sequence[BundleSummary]:
+        """Returns all bundles, without those that can't be read.
+
+        They are as they were at most LISTED_ANEW_S ago. Where reading the folders takes longer than
+        ANSWER_WITHIN_S, they are as they were the last time.
+
+        Raises:
+            TooMuchError: the folders are being read for the first time, or too many callers wait.
+        """
+        if self._clock() - self._listed_s > LISTED_ANEW_S:
+            listing = self._listing
+            if listing is None or listing.done():
+                listing = self._listing = asyncio.create_task(self._list(), name="list of run bundles")
+                self._listing_began_s = self._clock()
+            # Of callers who ask for page after page, only the first one waits for a list that takes longer.
+            waits_s = self._listing_began_s + ANSWER_WITHIN_S - self._clock()
+            await asyncio.wait({listing}, timeout=max(0.0, waits_s))
+            if listing.done():
+                listing.result()
+        if self._listed is None:
+            raise TooMuchError(
+                "the robot reads the folders of its experiments for the first time; try again later",
+                Reason.TOO_MANY_REQUESTS,
+                _RETRY_AFTER_S,
+            )
+        return self._listed
 
     async def get(self, bundle_id: str) -> Bundle | None:
         """Returns a bundle; None if there is no such."""
@@ -100,7 +120,12 @@ class BundleReader:
 
     async def close(self) -> None:
         """Ends what is being read."""
-        await cancel(self._reading.values())
+        self._bundles.stop()
+        await cancel([*self._reading.values(), *([self._listing] if self._listing else [])])
+
+    async def _list(self) -> None:
+        self._listed = await self._threads.run(self._bundles.all)
+        self._listed_s = self._clock()
 
     def _read(self, bundle_id: str, files: Sequence[FileState]) -> "asyncio.Task[None]":
         """Returns the task that reads these files, unless others of the bundle are being read."""

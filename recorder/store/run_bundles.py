@@ -9,12 +9,14 @@ import logging
 import os
 import re
 import stat
+import threading
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import islice
 from pathlib import Path
 from typing import Final, NoReturn
 
+from common.reader_threads import ClosedError
 from recorder.store.manifest import RecordingState
 
 _log = logging.getLogger(__name__)
@@ -52,23 +54,23 @@ class BundleFile:
     changed_ns: int
 
 
-@dataclass(frozen=True, slots=True)
-class Bundle:
-    """A folder of an experiment; instants in ns since 1970-01-01 UTC, from the times of its files."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BundleSummary:
+    """A folder of an experiment as it is listed; instants in ns since 1970-01-01 UTC, from its files' times.
+
+    Attributes:
+        size: Bytes of its files.
+        unlisted: Names that can't be requested: too long, not printable, or of no plain file, as a link's.
+    """
 
     id: str
     folder: Path
     state: RecordingState
-    files: tuple[BundleFile, ...]
+    size: int
+    file_count: int
     began_ns: int
     ended_ns: int
     unlisted: int = 0
-    """Names that can't be requested: too long, not printable, or of no plain file, as a link's."""
-
-    @property
-    def size(self) -> int:
-        """Bytes of its files."""
-        return sum(file.size for file in self.files)
 
     @property
     def started_unix_ms(self) -> int:
@@ -79,6 +81,18 @@ class Bundle:
     def final(self) -> bool:
         """Whether nothing more is written to it."""
         return self.state is not RecordingState.RECORDING
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bundle(BundleSummary):
+    """A folder of an experiment with its files; a list of all bundles would have no room for these."""
+
+    files: tuple[BundleFile, ...]
+
+    @property
+    def summary(self) -> BundleSummary:
+        """It, without its files."""
+        return BundleSummary(**{each.name: getattr(self, each.name) for each in fields(BundleSummary)})
 
     def file(self, name: str) -> BundleFile | None:
         """Returns the file with this name; None if it has none."""
@@ -96,18 +110,23 @@ class RunBundles:
         self._folders = tuple(folders)
         self._refused: set[Path] = set()
         """Folders of which the log says that they are not listed."""
+        self._stopped = threading.Event()
 
-    def all(self) -> list[Bundle]:
+    def stop(self) -> None:
+        """Ends what reads folders in other threads, and any that is begun later; they raise ClosedError."""
+        self._stopped.set()
+
+    def all(self) -> list[BundleSummary]:
         """Returns all bundles, without those that can't be read whole, or have more than MAX_FILES files."""
-        found: dict[str, Bundle] = {}
+        found: dict[str, BundleSummary] = {}
         for folder in self._candidates():
             try:
-                bundle = _read(folder)
+                bundle = _read(folder, self._stopped)
             except OSError as error:
                 if not isinstance(error, FileNotFoundError):  # That one has gone meanwhile.
                     self._refuse(folder, error)
                 continue
-            found.setdefault(bundle.id, bundle)
+            found.setdefault(bundle.id, bundle.summary)
             if len(found) >= _MAX_BUNDLES:
                 break
         return list(found.values())
@@ -118,7 +137,7 @@ class RunBundles:
             return None
         for folder in self._candidates(bundle_id):
             try:
-                return _read(folder)
+                return _read(folder, self._stopped)
             except OSError:
                 return None
         return None
@@ -170,16 +189,17 @@ def _id_of(name: str) -> str:
     return f"{_PREFIX}{hashlib.sha256(os.fsencode(name)).hexdigest()[:32]}"
 
 
-def _read(folder: Path) -> Bundle:
+def _read(folder: Path, stopped: threading.Event) -> Bundle:
     """Reads a bundle's folder.
 
     Raises:
         OSError: it can't be read.
         TooManyFilesError: it has too many files.
+        ClosedError: it was stopped.
     """
     with (folder / _MANIFEST).open("rb") as file:
         stated = _STATE.search(file.read(_MANIFEST_BYTES))
-    found = list(islice(_entries(folder), MAX_FILES + 1))
+    found = list(islice(_entries(folder, stopped), MAX_FILES + 1))
     if len(found) > MAX_FILES:
         raise TooManyFilesError(f"it has more than {MAX_FILES} files; split it, or copy it by other means")
     files = sorted(
@@ -191,6 +211,8 @@ def _read(folder: Path) -> Bundle:
         id=_id_of(folder.name),
         folder=folder,
         state=_STATES[stated[1]] if stated else RecordingState.RECOVERED,
+        size=sum(each.size for each in files),
+        file_count=len(files),
         files=tuple(files),
         began_ns=min(times, default=0),
         ended_ns=max(times, default=0),
@@ -198,14 +220,17 @@ def _read(folder: Path) -> Bundle:
     )
 
 
-def _entries(folder: Path) -> Iterator[BundleFile | None]:
+def _entries(folder: Path, stopped: threading.Event) -> Iterator[BundleFile | None]:
     """Yields the files below a folder, and None for each name that is neither a plain file nor a folder.
 
     Raises:
         OSError: a folder below can't be read: without it, a part would pass for the whole.
+        ClosedError: it was stopped.
     """
     for directory, folders, names in os.walk(folder, onerror=_fail):
         for name in (*names, *folders):
+            if stopped.is_set():
+                raise ClosedError
             path = Path(directory) / name
             status = path.lstat()
             if stat.S_ISREG(status.st_mode):

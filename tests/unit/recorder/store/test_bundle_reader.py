@@ -2,17 +2,19 @@
 
 import asyncio
 import hashlib
-from collections.abc import AsyncIterator
+import threading
+from collections.abc import AsyncIterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from common.errors import TooMuchError
+from common.reader_threads import ClosedError
 from recorder.store import bundle_reader
 from recorder.store.bundle_reader import LISTED_ANEW_S, MOST_AT_ONCE, BundleReader
 from recorder.store.readers import reader_threads
-from recorder.store.run_bundles import Bundle, RunBundles
+from recorder.store.run_bundles import Bundle, BundleSummary, RunBundles
 from recorder.store.sums import Sums
 from tests.support.clock import Clock
 from tests.support.eventually import eventually
@@ -22,10 +24,19 @@ DATA = b"x" * (2 * MIB + 5)
 
 
 class CountedBundles(RunBundles):
+    """On a disk that may be slow."""
+
     lists = 0
 
-    def all(self) -> list[Bundle]:
+    def __init__(self, folders: Sequence[Path]) -> None:
+        super().__init__(folders)
+        self.read = threading.Event()
+        """While it is not set, reading the folders takes its time."""
+        self.read.set()
+
+    def all(self) -> list[BundleSummary]:
         self.lists += 1
+        assert self.read.wait(20)
         return super().all()
 
 
@@ -68,6 +79,45 @@ async def test_many_who_list_at_once_have_the_folders_read_once(ground: Ground) 
     ground.clock.now_s += LISTED_ANEW_S + 0.1
     await ground.reader.all()
     assert ground.bundles.lists == 2
+
+
+async def test_folders_that_take_long_are_read_to_their_end_although_no_caller_waits(ground: Ground) -> None:
+    """The defect: the gateway gave up, which began the list anew, and recordings were not listed either."""
+    ground.bundles.read.clear()
+    for _ in range(3):
+        with pytest.raises(TooMuchError, match="for the first time"):
+            await ground.reader.all()
+    impatient = asyncio.create_task(ground.reader.all())
+    await asyncio.sleep(0)
+    impatient.cancel()
+    ground.bundles.read.set()
+    assert len(await ground.reader.all()) == MOST_AT_ONCE + 1
+    assert ground.bundles.lists == 1
+
+
+async def test_while_folders_are_read_the_list_is_that_of_the_last_time(
+    ground: Ground, tmp_path: Path
+) -> None:
+    assert len(await ground.reader.all()) == MOST_AT_ONCE + 1
+    add(tmp_path / "new")
+    ground.clock.now_s += LISTED_ANEW_S + 0.1
+    ground.bundles.read.clear()
+    assert len(await ground.reader.all()) == MOST_AT_ONCE + 1
+    ground.bundles.read.set()
+
+    async def listed() -> int:
+        return len(await ground.reader.all())
+
+    await eventually(listed, lambda now: now == MOST_AT_ONCE + 2, "the new one is listed")
+    assert ground.bundles.lists == 2
+
+
+async def test_the_end_does_not_wait_for_folders_that_take_long(tmp_path: Path) -> None:
+    add(tmp_path / "first")
+    bundles = RunBundles((tmp_path,))
+    bundles.stop()
+    with pytest.raises(ClosedError):
+        bundles.all()
 
 
 async def test_who_asks_again_gets_what_was_read_meanwhile(ground: Ground) -> None:

@@ -27,7 +27,8 @@ def test_a_folder_of_too_many_files_is_not_listed_as_if_a_part_were_all(
         assert bundles.get("run-first") is None
     assert caplog.text.count("first is not listed: it has more than 3 files") == 1
     (folder / "0.jsonl").unlink()
-    (found,) = bundles.all()
+    assert [each.id for each in bundles.all()] == ["run-first"]
+    assert (found := bundles.get("run-first"))
     assert [file.name for file in found.files] == ["1.jsonl", "2.jsonl", "manifest.yaml"]
 
 
@@ -41,7 +42,7 @@ def test_files_whose_names_can_t_be_requested_are_counted(tmp_path: Path) -> Non
     (deep / "f").touch()
     (folder / "link").symlink_to("manifest.yaml")
     (folder / "elsewhere").symlink_to(tmp_path)
-    (found,) = RunBundles((tmp_path,)).all()
+    assert (found := RunBundles((tmp_path,)).get("run-first"))
     assert [file.name for file in found.files] == ["manifest.yaml"]
     assert found.unlisted == 4
 
@@ -68,7 +69,8 @@ def test_a_folder_that_can_be_read_in_part_is_not_listed_as_if_that_were_all(
             assert bundles.all() == []
             assert bundles.get("run-first") is None
     assert caplog.messages == [f"{tmp_path / 'first'} is not listed: {locked}: Permission denied"]
-    (found,) = bundles.all()
+    assert [each.id for each in bundles.all()] == ["run-first"]
+    assert (found := bundles.get("run-first"))
     assert [file.name for file in found.files] == ["logs/run.log", "manifest.yaml"]
 
 
@@ -127,7 +129,8 @@ def test_a_bundle_is_complete_or_in_progress_only_if_its_manifest_says_so(
     (listed,) = bundles.all()
     assert listed.state is state
     assert listed.final == (state is not RecordingState.RECORDING)
-    assert bundles.get("run-first") == listed
+    assert (found := bundles.get("run-first"))
+    assert found.summary == listed
 
 
 def test_a_bundle_in_progress_is_final_once_its_manifest_says_so(tmp_path: Path) -> None:
