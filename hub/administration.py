@@ -69,7 +69,7 @@ def move_people(directory: HubDirectory, name: Callable[[User], None]) -> None:
 
 
 async def apply(directory: HubDirectory, limits: streams.StreamLimits | None = None) -> list[str]:
-    """Makes what is missing of streams, buckets and the robots' consumers, and repeats all revocations.
+    """Makes what is missing of streams, their room, buckets and consumers, and repeats all revocations.
 
     Returns:
         What differs in existing streams.

@@ -24,7 +24,7 @@ from hub.directory import HubDirectory, Kind, User
 from hub.receiver.cli import Config, receiver
 from hub.receiver.config import ReceiverSettings
 from hub.server_config import Node, Places
-from hub.streams import StreamLimits
+from hub.streams import EVENTS_BYTES, EVENTS_DAYS, RECORDINGS_BYTES, StreamLimits
 
 app = typer.Typer(help="The fleet's hub: make it, enroll robots, revoke them.", no_args_is_help=True)
 
@@ -81,14 +81,24 @@ def init(
 @app.command()
 def apply(
     directory: Dir = _DEFAULT_DIR,
-    events_mib: Annotated[int, typer.Option(min=1, help="Space for events, in MiB.")] = 8192,
-    events_days: Annotated[int, typer.Option(min=1, max=3650, help="How long events are kept.")] = 30,
+    events_mib: Annotated[
+        int | None, typer.Option(min=1, help=f"Room for events, in MiB; {EVENTS_BYTES // _MIB} at first.")
+    ] = None,
+    events_days: Annotated[
+        int | None, typer.Option(min=1, max=3650, help=f"How long events are kept; {EVENTS_DAYS} at first.")
+    ] = None,
+    recordings_mib: Annotated[
+        int | None,
+        typer.Option(min=1, help=f"Room for the list of recordings; {RECORDINGS_BYTES // _MIB} at first."),
+    ] = None,
 ) -> None:
-    """Create what streams, buckets and robots' consumers are missing, repeat revocations.
+    """Create what is missing at the hub, make more room where that is asked for, repeat revocations.
 
     Ends 1 when existing streams differ.
     """
-    limits = StreamLimits(events_mib * _MIB, events_days)
+    limits = StreamLimits(
+        events_mib and events_mib * _MIB, events_days, recordings_mib and recordings_mib * _MIB
+    )
     hub = HubDirectory(directory)
     # Before the servers are asked: an attempt that fails would not say it again.
     administration.move_people(hub, lambda user: typer.echo(_moved(user, hub)))
@@ -97,7 +107,7 @@ def apply(
     for difference in differences:
         typer.echo(difference)
     if differences:
-        typer.echo("These were left as they are. Change them with the tool nats, or choose the same limits.")
+        typer.echo("Left as they are: less room would cost messages. Change them with the tool nats.")
         raise typer.Exit(int(ExitCode.FAILED))
     typer.echo("The hub is ready. Next:  robot-bridge hub enroll ROBOT --out DIR")
 

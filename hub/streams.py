@@ -20,15 +20,33 @@ JOINING_S: Final = 30.0
 
 @dataclass(frozen=True, slots=True)
 class StreamLimits:
-    """What the streams may take. Defaults suit a hundred robots on one disk of 32 GB.
+    """What the streams may take; None: as much as they may already, or the default where one is made.
 
     Attributes:
         events_bytes: of events; when it is reached, robots keep theirs until older ones have expired.
         events_days: how long events and results are kept.
+        recordings_bytes: of the list of recordings; when it is reached, it takes no further ones.
     """
 
-    events_bytes: int = 8192 * _MIB
-    events_days: int = 30
+    events_bytes: int | None = None
+    events_days: int | None = None
+    recordings_bytes: int | None = None
+
+    def chosen(self, stream: str) -> dict[str, int]:
+        """Returns the limits of a stream that are not None, in the form of JetStream's API."""
+        max_age = self.events_days and self.events_days * _DAY_NS
+        limits = {
+            names.EVENTS: {"max_bytes": self.events_bytes, "max_age": max_age},
+            names.RESULTS: {"max_age": max_age},
+            f"KV_{names.RECORDINGS}": {"max_bytes": self.recordings_bytes},
+        }.get(stream, {})
+        return {key: value for key, value in limits.items() if value is not None}
+
+
+EVENTS_BYTES: Final = 8192 * _MIB
+EVENTS_DAYS: Final = 30
+RECORDINGS_BYTES: Final = 1024 * _MIB
+"""Defaults, which suit a hundred robots on one disk of 32 GB."""
 
 
 def stream_configs(replicas: int, limits: StreamLimits = StreamLimits()) -> dict[str, dict[str, Any]]:
@@ -39,23 +57,27 @@ def stream_configs(replicas: int, limits: StreamLimits = StreamLimits()) -> dict
         limits: what they may take.
     """
     once = {"max_msgs_per_subject": 1, "discard": "new", "discard_new_per_subject": True}
-    days = limits.events_days * _DAY_NS
+    days = EVENTS_DAYS * _DAY_NS
     streams = {
-        names.EVENTS: _stream(names.EVENT_SUBJECTS, limits.events_bytes, days, once),
+        names.EVENTS: _stream(names.EVENT_SUBJECTS, EVENTS_BYTES, days, once),
         names.RESULTS: _stream(names.RESULT_SUBJECTS, 256 * _MIB, days, once),
         # A command expires after a day at the latest.
         names.COMMANDS: _stream(names.COMMAND_SUBJECTS, 64 * _MIB, 2 * _DAY_NS, once),
         f"KV_{names.STATES}": _bucket(names.STATES, 256 * _MIB),
-        f"KV_{names.RECORDINGS}": _bucket(names.RECORDINGS, 1024 * _MIB),
+        f"KV_{names.RECORDINGS}": _bucket(names.RECORDINGS, RECORDINGS_BYTES),
         f"KV_{names.ROBOTS}": _bucket(names.ROBOTS, 64 * _MIB),
     }
-    return {name: {"name": name, "num_replicas": replicas, **config} for name, config in streams.items()}
+    return {
+        name: {"name": name, "num_replicas": replicas, **config, **limits.chosen(name)}
+        for name, config in streams.items()
+    }
 
 
 async def set_up(hub: Hub, replicas: int, limits: StreamLimits = StreamLimits()) -> list[str]:
-    """Makes the streams and buckets that are missing; of those that exist, it changes `_READABLE` alone.
+    """Makes the streams and buckets that are missing, and room in those that exist, where `limits` has more.
 
-    Waits for nodes of a cluster that are still joining, JOINING_S in all.
+    Less room would cost messages, so it counts as a difference. Waits for nodes of a cluster that are still
+    joining, JOINING_S in all.
 
     Returns:
         What differs in existing ones, as "fleet_events: max_bytes is 1, expected 2".
@@ -66,7 +88,7 @@ async def set_up(hub: Hub, replicas: int, limits: StreamLimits = StreamLimits())
     deadline_s = asyncio.get_running_loop().time() + JOINING_S
     differences: list[str] = []
     for name, config in stream_configs(replicas, limits).items():
-        differences += await _make_with_quorum(hub, name, config, deadline_s)
+        differences += await _make_with_quorum(hub, name, config, limits.chosen(name), deadline_s)
     return differences
 
 
@@ -90,6 +112,7 @@ class StreamUse:
         return self.size / self.most if self.most > 0 else 0.0
 
 
+_LIMITS: Final = frozenset({"max_bytes", "max_age"})
 _READABLE: Final = {"allow_direct": True}
 """People read by direct gets (fleet/direct.py). Hubs that were made before don't have it."""
 REPORTED: Final = (names.EVENTS, names.RESULTS, f"KV_{names.RECORDINGS}")
@@ -140,12 +163,14 @@ async def add_command_consumer(hub: Hub, robot: str) -> None:
     await hub.api(call, {"stream_name": names.COMMANDS, "config": config})
 
 
-async def _make_with_quorum(hub: Hub, name: str, config: dict[str, Any], deadline_s: float) -> list[str]:
+async def _make_with_quorum(
+    hub: Hub, name: str, config: dict[str, Any], chosen: Mapping[str, int], deadline_s: float
+) -> list[str]:
     """As `_make`, again and again for as long as nodes are missing, up to a time of the event loop."""
     backoff = Backoff(first_s=0.1, longest_s=2.0)
     while True:
         try:
-            return await _make(hub, name, config)
+            return await _make(hub, name, config, chosen)
         except HubError as error:
             pause_s = backoff.next_s()
             late = asyncio.get_running_loop().time() + pause_s > deadline_s
@@ -154,8 +179,12 @@ async def _make_with_quorum(hub: Hub, name: str, config: dict[str, Any], deadlin
         await asyncio.sleep(pause_s)
 
 
-async def _make(hub: Hub, name: str, config: dict[str, Any]) -> list[str]:
-    """Creates a stream if it is missing; else lets it be read as it has to be, and returns what differs."""
+async def _make(hub: Hub, name: str, config: dict[str, Any], chosen: Mapping[str, int]) -> list[str]:
+    """Creates a stream if it is missing; else makes it readable and as large as chosen.
+
+    Returns:
+        What differs then.
+    """
     try:
         info = await hub.api(f"STREAM.INFO.{name}")
     except HubError as error:
@@ -164,10 +193,13 @@ async def _make(hub: Hub, name: str, config: dict[str, Any]) -> list[str]:
         await hub.api(f"STREAM.CREATE.{name}", config)
         return []
     actual = info.get("config", {})
-    if any(actual.get(key) != value for key, value in _READABLE.items()):
-        actual = {**actual, **_READABLE}
-        await hub.api(f"STREAM.UPDATE.{name}", actual)
-    return _differences(name, config, actual)
+    grown = {key: value for key, value in chosen.items() if 0 < actual.get(key, 0) < value}
+    changed = {**actual, **_READABLE, **grown}
+    if changed != actual:
+        await hub.api(f"STREAM.UPDATE.{name}", changed)
+    # A limit that is not chosen is as someone else has chosen it.
+    expected = {key: value for key, value in config.items() if key in chosen or key not in _LIMITS}
+    return _differences(name, expected, changed)
 
 
 def _stream(subjects: str, max_bytes: int, max_age_ns: int, more: Mapping[str, Any]) -> dict[str, Any]:

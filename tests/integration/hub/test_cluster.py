@@ -18,6 +18,8 @@ from tests.support.nats_servers import NatsServers, nats_servers
 from tests.support.secure_hub import SecureHub, secure_hub
 from tests.support.simulated_fleet import received, simulated_fleet
 
+MIB = 1024 * 1024
+DAY_NS = 86_400 * 10**9
 _LONGEST_GAP_S = 15.0
 """docs/fleet.md."""
 
@@ -63,11 +65,33 @@ async def test_a_full_hub_refuses_and_loses_nothing(tmp_path: Path) -> None:
             assert (
                 await hub.publish_once(names.event_subject("r", "run", 0), b"x" * 4096) is Published.REPEATED
             )
-            config = streams.stream_configs(1, streams.StreamLimits())[names.EVENTS]
-            await hub.api(f"STREAM.UPDATE.{names.EVENTS}", config)
+            await streams.set_up(hub, 1, streams.StreamLimits(events_bytes=MIB))
             subject = names.event_subject("r", "run", delivered)
             assert await hub.publish_once(subject, b"x" * 4096) is Published.DELIVERED
         assert (await received(servers.urls, 1, delivered + 1)).lost == 0
+
+
+async def test_existing_streams_get_more_room_and_never_less(tmp_path: Path) -> None:
+    chosen = streams.StreamLimits(events_bytes=2 * MIB, events_days=40, recordings_bytes=2048 * MIB)
+    less = streams.StreamLimits(events_bytes=MIB, events_days=39, recordings_bytes=1024 * MIB)
+    recordings = f"KV_{names.RECORDINGS}"
+
+    async def limits(hub: Hub) -> list[tuple[int, int]]:
+        infos = [await hub.stream_info(name) for name in (names.EVENTS, names.RESULTS, recordings)]
+        return [(info["config"]["max_bytes"], info["config"]["max_age"] // DAY_NS) for info in infos]
+
+    with nats_servers(tmp_path, 1) as servers:
+        await _set_up(servers, 1, streams.StreamLimits(events_bytes=MIB, events_days=3))
+        async with connect(FleetAddress(servers.urls)) as hub:
+            await hub.connected(10)
+            assert await limits(hub) == [(MIB, 3), (256 * MIB, 3), (1024 * MIB, 0)]
+            assert await streams.set_up(hub, 1, chosen) == []
+            grown = await limits(hub)
+            assert grown == [(2 * MIB, 40), (256 * MIB, 40), (2048 * MIB, 0)]
+            # Without a choice, they stay as someone has chosen them.
+            assert await streams.set_up(hub, 1) == []
+            assert len(await streams.set_up(hub, 1, less)) == 4
+            assert await limits(hub) == grown
 
 
 async def test_without_a_majority_nothing_is_acknowledged(tmp_path: Path) -> None:

@@ -88,11 +88,13 @@ def test_a_configuration_that_can_not_carry_revocations_is_reported(hub: Path, t
     assert "nats.conf" not in _type("apply", "--dir", str(hub)).output, "the servers alone have theirs"
 
 
-def test_other_limits_are_reported_and_not_changed(hub: Path) -> None:
+def test_lower_limits_are_reported_and_not_set(hub: Path) -> None:
     _type("apply", "--dir", str(hub))
-    result = _type("apply", "--dir", str(hub), "--events-days", "3")
+    assert _type("apply", "--dir", str(hub), "--events-days", "40").exit_code == 0
+    result = _type("apply", "--dir", str(hub), "--events-days", "30")
     assert result.exit_code == 1
     assert "fleet_events: max_age is" in result.output
+    assert _type("apply", "--dir", str(hub)).exit_code == 0
 
 
 def test_a_robot_that_fills_a_stream_for_all_is_found_and_purged(hub: Path, tmp_path: Path) -> None:
