@@ -23,7 +23,8 @@ from omniseer.gateway.v1 import fault_pb2, value_pb2
 _PREFIX: Final = "robot_fleet"
 _MS_PER_S: Final = 1000
 MOST_ROBOTS: Final = 10_000
-"""Further ones get no metrics: Prometheus keeps a time series for each name that it has ever seen."""
+"""Further ones get no metrics, and are counted up to as many again: Prometheus keeps a time series for each
+name that it has ever seen."""
 MOST_SERIES: Final = 64
 """Values of one robot that get time series until the exporter is started again: a thief of its key could name
 others in each state."""
@@ -84,6 +85,7 @@ class FleetCollector(InstantCollector):
     connected: Callable[[], bool]
     _enrolled: dict[str, bool] = field(default_factory=dict)
     _states: dict[str, SeenState] = field(default_factory=dict)
+    _left_out: set[str] = field(default_factory=set)
     _uses: dict[str, StreamUse] = field(default_factory=dict)
     _series: dict[str, set[tuple[str, ...]]] = field(default_factory=dict)
 
@@ -92,8 +94,14 @@ class FleetCollector(InstantCollector):
         if deleted:
             self._enrolled.pop(name, None)
             self._series.pop(name, None)
-        elif ROBOT_NAME.fullmatch(name) and (name in self._enrolled or len(self._enrolled) < MOST_ROBOTS):
+            self._left_out.discard(name)
+        elif not ROBOT_NAME.fullmatch(name):
+            return
+        elif name in self._enrolled or len(self._enrolled) < MOST_ROBOTS:
             self._enrolled[name] = is_revoked(entry)
+            self._left_out.discard(name)
+        elif len(self._left_out) < MOST_ROBOTS:
+            self._left_out.add(name)
 
     def take_state(self, name: str, value: bytes, received_unix_ms: int, *, deleted: bool) -> None:
         """Takes a robot's newest state."""
@@ -110,6 +118,11 @@ class FleetCollector(InstantCollector):
         """Yields every family."""
         robots = [self._sample(name) for name in sorted(self._enrolled)]
         yield Gauge(f"{_PREFIX}_hub_connected", "1 while the hub answers.", value=self.connected())
+        yield Gauge(
+            f"{_PREFIX}_robots_left_out",
+            f"Robots of the hub's list beyond {MOST_ROBOTS}, which have no metrics.",
+            value=len(self._left_out),
+        )
         yield _uses(self._uses.values())
         yield _standings(robots)
         current = [robot for robot in robots if robot.standing is not Standing.REVOKED]

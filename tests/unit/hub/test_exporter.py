@@ -107,7 +107,11 @@ def test_a_robot_that_is_taken_from_the_list_has_no_metrics(collector: FleetColl
 
 def test_the_number_of_robots_is_bounded(collector: FleetCollector) -> None:
     enroll(collector, *(f"r{number}" for number in range(MOST_ROBOTS + 5)))
-    assert sum(labels[0] == "up" for labels in samples(collector)) == MOST_ROBOTS
+    found = samples(collector)
+    assert sum(labels[0] == "up" for labels in found) == MOST_ROBOTS
+    assert found["robots_left_out",] == 5
+    collector.take_robot(f"r{MOST_ROBOTS}", b"", deleted=True)
+    assert samples(collector)["robots_left_out",] == 4
 
 
 def test_values_that_are_not_known_have_no_metric(collector: FleetCollector) -> None:
