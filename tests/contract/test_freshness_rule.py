@@ -117,7 +117,7 @@ def is_excused(name: str) -> bool:
 
 
 @pytest.mark.parametrize("message", answers(), ids=lambda message: message.name)
-def test_every_value_tells_its_age_or_why_it_needs_none(message: Descriptor) -> None:
+def test_every_value_has_its_age_or_a_reason_for_none(message: Descriptor) -> None:
     assert [name for name in values_without_freshness(message) if not is_excused(name)] == []
 
 

@@ -55,7 +55,7 @@ def test_installed_once_used_and_taken_away(home: Path) -> None:
     assert not (home / ".local/share/robot-gateway").exists()
 
 
-def test_what_somebody_else_put_there_is_not_touched(home: Path) -> None:
+def test_what_others_put_there_is_not_touched(home: Path) -> None:
     link = home / ".local/bin/robotctl"
     link.parent.mkdir(parents=True)
     link.write_text("mine")

@@ -98,7 +98,7 @@ def test_a_word_it_does_not_know_changes_nothing(robot: SystemdRobot, options: l
     refusal(robot, *options)
 
 
-def test_an_ordinary_user_is_told_to_type_sudo(robot: SystemdRobot) -> None:
+def test_an_ordinary_user_learns_to_type_sudo(robot: SystemdRobot) -> None:
     done = robot.as_user("robot-preview", SCRIPT)
     assert (done.returncode, "Type: sudo scripts/install-robot" in done.stderr) == (1, True)
 

@@ -64,7 +64,7 @@ def test_since_resumes_exactly_after_its_position(ground: Path) -> None:
         assert all(position(each)[1] > last for each in events(target, "--since", f"{run_id}:{last}"))
 
 
-def test_follow_tells_what_happens_an_outage_and_the_gap_behind_it(ground: Path) -> None:
+def test_follow_prints_events_an_outage_and_the_gap_behind_it(ground: Path) -> None:
     said, port = documented("events --json"), free_tcp_port()
     command = [str(ROBOTCTL), "--target", f"127.0.0.1:{port}", "--json", "events", "--follow"]
     with gateway_program(ground, port, sources=[]) as gateway:

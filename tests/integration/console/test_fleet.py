@@ -341,7 +341,7 @@ def robot_that_answers(hub: FleetHub, answer: Callable[[Command], CommandResult]
         robot.join(ENDS_WITHIN_S)
 
 
-def test_a_command_that_nobody_takes_expires(hub: FleetHub) -> None:
+def test_a_command_that_no_robot_takes_expires(hub: FleetHub) -> None:
     hub.enroll("lab1")
     with mock.patch("console.cli.fleet.ANSWER_AFTER_EXPIRY_S", 0.1):
         done = robotctl("fleet", "command", "lab1", "snapshot", "--expires", "1", "--hub", hub.urls)

@@ -192,7 +192,7 @@ async def test_answers_for_another_robot_are_not_given(servers: NatsServers) -> 
         assert asked == ["r1"]
 
 
-async def test_more_requests_than_permitted_are_told_so(servers: NatsServers) -> None:
+async def test_more_requests_than_permitted_are_refused_with_the_reason(servers: NatsServers) -> None:
     proceed = asyncio.Event()
 
     async def answer(request: Request) -> None:

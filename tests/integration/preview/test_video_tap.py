@@ -88,9 +88,7 @@ def _read_for_ever(reader: BareReader) -> None:
         reader.record()
 
 
-def test_it_records_while_nobody_watches_and_operators_see_no_preview(
-    preview: Tapped, tmp_path: Path
-) -> None:
+def test_it_records_without_viewers_and_operators_see_no_preview(preview: Tapped, tmp_path: Path) -> None:
     with TapRecording(preview.tap) as recording:
         recording.wait_for_frames(45)
         state = preview.wait_for(lambda a: a.pipeline_state == LISTENING, "the pipeline runs")

@@ -168,7 +168,7 @@ async def test_the_gap_of_a_failed_disk_covers_what_was_buffered(tmp_path: Path)
         assert gap.began_ns <= handed_ns < gap.ended_ns
 
 
-async def test_a_snapshot_tells_when_the_ring_could_not_be_written(tmp_path: Path) -> None:
+async def test_a_snapshot_has_the_gap_of_a_ring_that_could_not_be_written(tmp_path: Path) -> None:
     async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
         await running.until(lambda: running.status_reader.writes)
         source = Source(running.queue)
@@ -250,7 +250,7 @@ async def test_a_fault_while_the_ring_can_not_be_written_is_refused_and_makes_an
         assert running.status_reader.get(made).kind is Kind.INCIDENT
 
 
-async def test_a_snapshot_over_a_restart_tells_of_it(tmp_path: Path) -> None:
+async def test_a_snapshot_over_a_restart_has_its_gap(tmp_path: Path) -> None:
     ring = {"preset": "all"}
     async with running_recorder(tmp_path, ring=ring) as running:
         await running.until(lambda: running.status_reader.writes)
@@ -749,7 +749,7 @@ async def test_a_copy_that_shares_its_blocks_is_not_deleted_in_vain(small_disk: 
         assert not running.status_reader.has(other.id)
 
 
-async def test_the_room_that_is_told_has_what_older_recordings_make(small_disk: Path) -> None:
+async def test_the_room_that_is_reported_includes_what_older_recordings_make(small_disk: Path) -> None:
     """A robot that has recorded for weeks is always at its limit, and can record as long as ever."""
     async with running_recorder(small_disk / "root") as running:
         one, pinned = await recorded(running, 8 * MIB), await recorded(running, 4 * MIB)

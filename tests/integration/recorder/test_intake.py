@@ -256,7 +256,7 @@ def stall(taken: Taken, publisher: Any, message: Any) -> None:
     goes_on.set()
 
 
-def test_losses_are_told_when_the_intake_has_caught_up(
+def test_losses_are_reported_once_the_intake_has_caught_up(
     talker: Talker, taken: Taken, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """And not only when the graph is examined the next time: a recording has ended by then."""

@@ -308,7 +308,7 @@ async def test_deleting_needs_a_reason_that_is_good_enough(tmp_path: Path) -> No
             await running.operations.delete("7", done.id, b"", force=False)
 
 
-async def test_a_copy_tells_what_the_manifest_knows(tmp_path: Path) -> None:
+async def test_a_copy_has_what_the_manifest_has(tmp_path: Path) -> None:
     """The files of a recording are copied, its manifest is not."""
     options = StartOptions(label="lap 1", notes="wet: floor\n- and dark")
     async with running_recorder(tmp_path) as running:

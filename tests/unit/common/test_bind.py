@@ -51,7 +51,7 @@ async def test_a_second_server_does_not_share_the_port() -> None:
     ("host", "words"),
     [("192.0.2.77", "not an address of this machine"), ("no-such-host.invalid", "not an address or a known")],
 )
-async def test_an_address_of_somebody_else_is_said_to_be(server: Server, host: str, words: str) -> None:
+async def test_an_address_of_another_host_is_reported_as_one(server: Server, host: str, words: str) -> None:
     with pytest.raises(UserError, match=words):
         bind_tcp(server, host, 0)
 

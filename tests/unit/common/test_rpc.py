@@ -78,7 +78,7 @@ async def test_a_domain_error_arrives_with_its_code_and_words(stream: bool) -> N
 
 
 @pytest.mark.parametrize("stream", [False, True])
-async def test_a_defect_tells_the_log_everything_and_the_caller_nothing(
+async def test_a_defect_is_in_the_log_whole_and_in_no_answer(
     stream: bool, caplog: pytest.LogCaptureFixture
 ) -> None:
     with pytest.raises(grpc.aio.AioRpcError) as seen:

@@ -203,7 +203,7 @@ def test_hand_back_ends_the_zeros(tmp_path: Path) -> None:
     assert read_stops(running.stop_file).latch is None
 
 
-def test_a_worker_that_nobody_drives_with_is_replaced_without_a_word(tmp_path: Path) -> None:
+def test_a_worker_without_a_driver_is_replaced_silently(tmp_path: Path) -> None:
     with guarding(tmp_path, "rest") as running:
         os.kill(running.worker(), signal.SIGKILL)
         running.worker(2)

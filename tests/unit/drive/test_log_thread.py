@@ -10,7 +10,7 @@ def record(text: str) -> logging.LogRecord:
     return logging.LogRecord("drive", logging.INFO, __file__, 1, text, None, None)
 
 
-def test_a_reader_that_stands_still_blocks_nobody() -> None:
+def test_a_reader_that_stands_still_blocks_no_writer() -> None:
     reader, writer = os.pipe()
     try:
         handler = LogThread(logging.Formatter("%(message)s"), writer)

@@ -43,7 +43,7 @@ def test_a_file_that_says_nothing_counts_as_a_stop(tmp_path: Path, content: byte
     assert "there may have been a stop" in latch.reason
 
 
-def test_a_disk_that_hangs_delays_nobody_and_keeps_the_newest(
+def test_a_disk_that_hangs_delays_no_caller_and_keeps_the_newest(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     hangs, writing, written = threading.Event(), threading.Event(), []

@@ -201,7 +201,7 @@ class SlowQueue(FrameQueue):
 
 
 @pytest.mark.timed
-def test_a_decoder_that_is_too_slow_shows_newer_frames_and_bothers_nobody(port: int) -> None:
+def test_a_decoder_that_is_too_slow_shows_newer_frames_and_slows_no_other(port: int) -> None:
     """At 10 of 30 frames per second; a key frame comes every 15."""
     pieces = encode("h264", 3 * FRAMES, kbps=500, gop=KEY_FRAME_EVERY)
     lost: list[int | None] = []
@@ -360,7 +360,7 @@ def stuck() -> Iterator[threading.Event]:
 
 
 @pytest.mark.parametrize("delivery", [DeliveryChoice.DIRECT, DeliveryChoice.SRT])
-def test_a_resolver_that_hangs_keeps_nobody_waiting(
+def test_a_resolver_that_hangs_delays_no_caller(
     stuck: threading.Event, monkeypatch: pytest.MonkeyPatch, delivery: DeliveryChoice
 ) -> None:
     monkeypatch.setattr("console.name_lookup.socket.getaddrinfo", lambda *_args, **_more: stuck.wait() and [])

@@ -212,7 +212,7 @@ def test_an_older_robot_is_viewed_without_ages(tmp_path: Path) -> None:
             assert robot.meter.report() is None
 
 
-def test_headless_tells_the_age(tmp_path: Path) -> None:
+def test_headless_prints_the_age(tmp_path: Path) -> None:
     with video_ground(tmp_path) as ground:
         ground.switch_on(PreviewProfile.BALANCED)
         begun_s = time.monotonic()

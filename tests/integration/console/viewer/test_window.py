@@ -200,7 +200,7 @@ def test_a_window_that_was_busy_paints_the_latest_frame_only(ground: VideoGround
 
 
 @pytest.mark.parametrize("hidden_by", [QWidget.showMinimized, QWidget.hide], ids=["minimised", "hidden"])
-def test_a_window_that_nobody_can_see_reports_no_age(
+def test_a_hidden_window_reports_no_age(
     ground: VideoGround, view: ViewWindow, hidden_by: Callable[[QWidget], None]
 ) -> None:
     """Its age would only grow, and lower the bit rate of all viewers."""

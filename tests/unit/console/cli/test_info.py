@@ -47,5 +47,5 @@ def test_scripts_get_the_configuration_as_an_object() -> None:
     assert document["gateway"]["boot_id"] is None
 
 
-def test_a_gateway_that_tells_no_configuration_is_no_error() -> None:
+def test_a_gateway_that_reports_no_configuration_is_no_error() -> None:
     assert info_json(GET_GATEWAY_INFO.decode(b""))["configuration"] is None

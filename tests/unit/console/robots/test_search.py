@@ -96,7 +96,7 @@ def test_a_network_that_cannot_be_searched_is_said(network: Network, search: Net
     assert search.error is network.error
 
 
-def test_a_search_that_opens_slowly_keeps_nobody_waiting(network: Network, search: NetworkSearch) -> None:
+def test_a_search_that_opens_slowly_delays_no_caller(network: Network, search: NetworkSearch) -> None:
     """The list that asked for it may be closed by then: what it finds is of no use any more."""
     network.blocked = threading.Event()
     network.robots.append(Found("late", "10.0.0.9:1"))

@@ -184,7 +184,7 @@ def test_whether_messages_are_numbered_is_known_however_a_file_ends(
     assert summarise(found.path) == found
 
 
-def test_losses_are_told_again(tmp_path: Path) -> None:
+def test_losses_are_reported_again(tmp_path: Path) -> None:
     writer = SegmentWriter(tmp_path / "0.mcap.part")
     writer.write(string_sample(0))
     writer.loss(Loss(STRING, GapCause.MIDDLEWARE, 1, 2, 3))

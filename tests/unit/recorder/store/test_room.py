@@ -57,7 +57,7 @@ def test_what_was_deleted_counts_as_room_until_the_disk_shows_it() -> None:
     assert to_come.bytes(60.0) == 1
 
 
-def test_files_are_told_with_what_they_take_and_share(tmp_path: Path) -> None:
+def test_files_are_listed_with_their_sizes_and_shares(tmp_path: Path) -> None:
     one, other = tmp_path / "one", tmp_path / "other"
     one.write_bytes(bytes(5000))
     other.hardlink_to(one)

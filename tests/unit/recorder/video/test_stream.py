@@ -128,7 +128,7 @@ def test_a_preview_that_was_never_there_is_a_loss_to_the_end() -> None:
     assert Run().stream.end(later) == []
 
 
-def test_a_loss_so_far_is_told_and_lasts_on() -> None:
+def test_a_loss_so_far_is_reported_and_goes_on() -> None:
     run = Run()
     (last,) = samples(run.unit())
     assert run.stream.loss_so_far(run.now) == []

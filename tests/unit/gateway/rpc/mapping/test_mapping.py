@@ -326,7 +326,7 @@ def test_an_active_fault_has_no_end_and_one_that_is_over_has() -> None:
     assert (over.active, over.age_ms, over.cleared_age_ms) == (False, 13_000, 10_000)
 
 
-def test_the_passphrase_goes_only_to_those_who_sees_passphrase() -> None:
+def test_the_passphrase_goes_only_to_roles_that_may_see_it() -> None:
     stranger = Recipient(robot_host="fe80::1", sees_passphrase=False)
     overlay = overlay_snapshot(everything(), stranger)
     assert overlay.status.preview.endpoint.encrypted
