@@ -1,14 +1,12 @@
 """Exponential backoff: the growing pauses between attempts at something that keeps failing."""
 
-from typing import Final
-
-_LARGEST_EXPONENT: Final = 64
-"""Failures go on for ever, and powers need not."""
-
 
 def pause_s(failures: int, first_s: float, longest_s: float, factor: float = 2.0) -> float:
     """Returns the pause after so many failures in succession, in seconds; arguments as of `Backoff`."""
-    return min(longest_s, first_s * factor ** min(failures - 1, _LARGEST_EXPONENT))
+    try:
+        return min(longest_s, first_s * float(factor) ** (failures - 1))
+    except OverflowError:  # Failures go on for ever.
+        return longest_s
 
 
 class Backoff:

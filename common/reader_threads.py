@@ -3,7 +3,7 @@
 import asyncio
 import os
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from typing import Final, ParamSpec, TypeVar
 
 from common.errors import TooMuchError
@@ -57,11 +57,12 @@ class ReaderThreads:
             )
         self._jobs += 1
         job = self._threads.submit(work, *args, **kwargs)
+        result = asyncio.wrap_future(job)
         try:
-            return await asyncio.shield(asyncio.wrap_future(job))
+            return await asyncio.shield(result)
         except asyncio.CancelledError:
             if not job.cancel():
-                await _ended(job)
+                await _ended(result)
             raise
         finally:
             self._jobs -= 1
@@ -91,9 +92,8 @@ class ReaderThreads:
         self._threads.shutdown(wait=False, cancel_futures=True)
 
 
-async def _ended(job: "Future[_T]") -> None:
+async def _ended(result: "asyncio.Future[_T]") -> None:
     """Waits until a job that runs has ended, however often this task is cancelled meanwhile."""
-    result = asyncio.wrap_future(job)
     while not result.done():
         try:
             await asyncio.wait({result})

@@ -1,5 +1,6 @@
 """The pauses between attempts."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -24,8 +25,9 @@ def test_the_first_pause_is_no_longer_than_the_limit() -> None:
     assert Backoff(first_s=5, longest_s=2).next_s() == 2
 
 
-def test_endless_failures_do_not_overflow() -> None:
-    backoff = Backoff(first_s=0.1, longest_s=1.0)
+@pytest.mark.parametrize("factor", [1.01, 2.0, 3, 65536.0])
+def test_endless_failures_reach_the_limit_and_do_not_overflow(factor: float) -> None:
+    backoff = Backoff(first_s=0.1, longest_s=1.0, factor=factor)
     assert [backoff.next_s() for _ in range(5000)][-1] == 1.0
 
 
