@@ -15,8 +15,12 @@ from recorder.store.sums import FileState, Sums
 
 LISTED_ANEW_S: Final = 2.0
 """After that the folders are read again for a list."""
+OLD_S: Final = 10.0
+"""From then on a list is old."""
 ANSWER_WITHIN_S: Final = 2.0
-"""What has not been read by then is not in the answer; the gateway waits for 5 s."""
+"""What has not been read by then is not in the answer."""
+ANSWER_INSTEAD_OF_OLD_WITHIN_S: Final = 4.0
+"""The same, where the answer would else be an old list, or none. The gateway waits for 5 s."""
 MOST_AT_ONCE: Final = 4
 """Bundles whose files are read."""
 _RETRY_AFTER_S: Final = 10.0
@@ -57,20 +61,22 @@ class BundleReader:
     async def all(self) -> Sequence[BundleSummary]:
         """Returns all bundles, without those that can't be read.
 
-        They are as they were at most LISTED_ANEW_S ago. Where reading the folders takes longer than
-        ANSWER_WITHIN_S, they are as they were the last time.
+        They are as they were at most LISTED_ANEW_S ago; where reading the folders takes longer than
+        ANSWER_WITHIN_S, OLD_S ago; and longer than ANSWER_INSTEAD_OF_OLD_WITHIN_S, at the time before.
 
         Raises:
             TooMuchError: the folders are being read for the first time, or too many callers wait.
         """
-        if self._clock() - self._listed_s > LISTED_ANEW_S:
+        age_s = self._clock() - self._listed_s
+        if age_s > LISTED_ANEW_S:
             listing = self._listing
             if listing is None or listing.done():
                 listing = self._listing = asyncio.create_task(self._list(), name="list of run bundles")
                 self._listing_began_s = self._clock()
             # Of callers who ask for page after page, only the first one waits for a list that takes longer.
-            waits_s = self._listing_began_s + ANSWER_WITHIN_S - self._clock()
-            await asyncio.wait({listing}, timeout=max(0.0, waits_s))
+            within_s = ANSWER_WITHIN_S if age_s <= OLD_S else ANSWER_INSTEAD_OF_OLD_WITHIN_S
+            left_s = self._listing_began_s + within_s - self._clock()
+            await asyncio.wait({listing}, timeout=max(0.0, left_s))
             if listing.done():
                 listing.result()
         if self._listed is None:

@@ -158,6 +158,8 @@ class RunBundles:
                 self._refuse(parent, error)
                 continue
             for each in entries:
+                if self._stopped.is_set():
+                    raise ClosedError
                 if bundle_id and _id_of(each.name) != bundle_id:
                     continue
                 try:

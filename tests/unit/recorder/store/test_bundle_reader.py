@@ -1,18 +1,20 @@
 """Lists of run bundles are read once for all who ask, and files in the background, a few bundles at once."""
 
 import asyncio
+import gc
 import hashlib
 import threading
+import time
 from collections.abc import AsyncIterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from common.errors import TooMuchError
-from common.reader_threads import ClosedError
 from recorder.store import bundle_reader
-from recorder.store.bundle_reader import LISTED_ANEW_S, MOST_AT_ONCE, BundleReader
+from recorder.store.bundle_reader import LISTED_ANEW_S, MOST_AT_ONCE, OLD_S, BundleReader
 from recorder.store.readers import reader_threads
 from recorder.store.run_bundles import Bundle, BundleSummary, RunBundles
 from recorder.store.sums import Sums
@@ -62,6 +64,7 @@ def add(folder: Path, data: bytes = DATA) -> None:
 async def ground(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Ground]:
     """A robot that takes half a second for the files of a bundle, and answers before."""
     monkeypatch.setattr(bundle_reader, "ANSWER_WITHIN_S", 0.05)
+    monkeypatch.setattr(bundle_reader, "ANSWER_INSTEAD_OF_OLD_WITHIN_S", 0.1)
     for number in range(MOST_AT_ONCE + 1):
         add(tmp_path / str(number))
     bundles, clock = CountedBundles((tmp_path,)), Clock()
@@ -112,12 +115,64 @@ async def test_while_folders_are_read_the_list_is_that_of_the_last_time(
     assert ground.bundles.lists == 2
 
 
-async def test_the_end_does_not_wait_for_folders_that_take_long(tmp_path: Path) -> None:
+async def test_a_list_that_is_old_is_waited_for_longer(
+    ground: Ground, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bundle_reader, "ANSWER_INSTEAD_OF_OLD_WITHIN_S", 20.0)
+    await ground.reader.all()
+    add(tmp_path / "new")
+    ground.clock.now_s += OLD_S + 0.1
+    ground.bundles.read.clear()
+    listing = asyncio.create_task(ground.reader.all())
+    await asyncio.sleep(0)
+    ground.bundles.read.set()
+    assert len(await listing) == MOST_AT_ONCE + 2
+
+
+async def test_of_those_who_list_only_the_first_waits_for_folders_that_take_long(
+    ground: Ground, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    await ground.reader.all()
+    ground.clock.now_s += LISTED_ANEW_S + 0.1
+    ground.bundles.read.clear()
+    await ground.reader.all()
+    monkeypatch.setattr(bundle_reader, "ANSWER_WITHIN_S", 20.0)
+    ground.clock.now_s += 20.1 - LISTED_ANEW_S
+    monkeypatch.setattr(bundle_reader, "OLD_S", 30.0)
+    began_s = time.monotonic()
+    await ground.reader.all()
+    assert time.monotonic() - began_s < 10
+    ground.bundles.read.set()
+
+
+async def test_the_end_does_not_wait_for_folders_that_take_long(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A list, and a bundle that a caller who has left asked for."""
     add(tmp_path / "first")
-    bundles = RunBundles((tmp_path,))
-    bundles.stop()
-    with pytest.raises(ClosedError):
-        bundles.all()
+    for number in range(300):
+        (tmp_path / "first" / str(number)).touch()
+    lstat, begun = Path.lstat, threading.Event()
+
+    def slowly(self: Path) -> Any:
+        begun.set()
+        time.sleep(0.1)
+        return lstat(self)
+
+    monkeypatch.setattr(Path, "lstat", slowly)
+    with reader_threads() as readers:
+        reader = BundleReader(RunBundles((tmp_path,)), readers.looks, Sums(readers.files))
+        calls = [asyncio.create_task(reader.all()), asyncio.create_task(reader.get("run-first"))]
+        assert await asyncio.to_thread(begun.wait, 20)
+        began_s = time.monotonic()
+        for call in calls:
+            call.cancel()
+        await reader.close()
+        await asyncio.wait(calls)
+        assert time.monotonic() - began_s < 10, "reading takes 30 s"
+    del calls, call
+    gc.collect()
+    assert not caplog.records
 
 
 async def test_who_asks_again_gets_what_was_read_meanwhile(ground: Ground) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from common.reader_threads import ClosedError
 from recorder.store import run_bundles
 from recorder.store.manifest import RecordingState
 from recorder.store.run_bundles import RunBundles
@@ -131,6 +132,14 @@ def test_a_bundle_is_complete_or_in_progress_only_if_its_manifest_says_so(
     assert listed.final == (state is not RecordingState.RECORDING)
     assert (found := bundles.get("run-first"))
     assert found.summary == listed
+
+
+def test_it_can_be_stopped_also_where_no_folder_is_a_bundle(tmp_path: Path) -> None:
+    (tmp_path / "none").mkdir()
+    bundles = RunBundles((tmp_path,))
+    bundles.stop()
+    with pytest.raises(ClosedError):
+        bundles.all()
 
 
 def test_a_bundle_in_progress_is_final_once_its_manifest_says_so(tmp_path: Path) -> None:

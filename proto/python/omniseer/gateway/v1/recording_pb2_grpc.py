@@ -155,7 +155,8 @@ class RecordingServiceServicer:
         a second.
 
         INVALID_ARGUMENT: a page token that this robot has not issued.
-        RESOURCE_EXHAUSTED: called too often, or the robot reads for too many callers at once.
+        RESOURCE_EXHAUSTED: called too often, or the robot reads for too many callers at once, or still reads the folders of
+        its experiments for the first time since its recorder was started.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -70,7 +70,8 @@ class RecordingServiceStub:
     a second.
 
     INVALID_ARGUMENT: a page token that this robot has not issued.
-    RESOURCE_EXHAUSTED: called too often, or the robot reads for too many callers at once.
+    RESOURCE_EXHAUSTED: called too often, or the robot reads for too many callers at once, or still reads the folders of
+    its experiments for the first time since its recorder was started.
     """
     GetRecording: _grpc.UnaryUnaryMultiCallable[_recording_pb2.GetRecordingRequest, _recording_pb2.GetRecordingResponse]
     """One recording, with its files, a page at a time. A connection may call it 20 times a second.
@@ -166,7 +167,8 @@ class RecordingServiceAsyncStub(RecordingServiceStub):
     a second.
 
     INVALID_ARGUMENT: a page token that this robot has not issued.
-    RESOURCE_EXHAUSTED: called too often, or the robot reads for too many callers at once.
+    RESOURCE_EXHAUSTED: called too often, or the robot reads for too many callers at once, or still reads the folders of
+    its experiments for the first time since its recorder was started.
     """
     GetRecording: _aio.UnaryUnaryMultiCallable[_recording_pb2.GetRecordingRequest, _recording_pb2.GetRecordingResponse]  # type: ignore[assignment]
     """One recording, with its files, a page at a time. A connection may call it 20 times a second.
@@ -283,7 +285,8 @@ class RecordingServiceServicer(metaclass=_abc_1.ABCMeta):
         a second.
 
         INVALID_ARGUMENT: a page token that this robot has not issued.
-        RESOURCE_EXHAUSTED: called too often, or the robot reads for too many callers at once.
+        RESOURCE_EXHAUSTED: called too often, or the robot reads for too many callers at once, or still reads the folders of
+        its experiments for the first time since its recorder was started.
         """
 
     @_abc_1.abstractmethod
