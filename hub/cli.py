@@ -107,7 +107,7 @@ def apply(
     for difference in differences:
         typer.echo(difference)
     if differences:
-        typer.echo("Left as they are: less room would cost messages. Change them with the tool nats.")
+        typer.echo("These were left as they are (less room costs messages). Change them with the tool nats.")
         raise typer.Exit(int(ExitCode.FAILED))
     typer.echo("The hub is ready. Next:  robot-bridge hub enroll ROBOT --out DIR")
 

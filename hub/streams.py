@@ -43,6 +43,7 @@ class StreamLimits:
         return {key: value for key, value in limits.items() if value is not None}
 
 
+_ANY: Final = StreamLimits(events_bytes=1, events_days=1, recordings_bytes=1)
 EVENTS_BYTES: Final = 8192 * _MIB
 EVENTS_DAYS: Final = 30
 RECORDINGS_BYTES: Final = 1024 * _MIB
@@ -112,7 +113,6 @@ class StreamUse:
         return self.size / self.most if self.most > 0 else 0.0
 
 
-_LIMITS: Final = frozenset({"max_bytes", "max_age"})
 _READABLE: Final = {"allow_direct": True}
 """People read by direct gets (fleet/direct.py). Hubs that were made before don't have it."""
 REPORTED: Final = (names.EVENTS, names.RESULTS, f"KV_{names.RECORDINGS}")
@@ -197,8 +197,9 @@ async def _make(hub: Hub, name: str, config: dict[str, Any], chosen: Mapping[str
     changed = {**actual, **_READABLE, **grown}
     if changed != actual:
         await hub.api(f"STREAM.UPDATE.{name}", changed)
-    # A limit that is not chosen is as someone else has chosen it.
-    expected = {key: value for key, value in config.items() if key in chosen or key not in _LIMITS}
+    # A limit that is not chosen now is as it was chosen before.
+    free = _ANY.chosen(name).keys() - chosen.keys()
+    expected = {key: value for key, value in config.items() if key not in free}
     return _differences(name, expected, changed)
 
 

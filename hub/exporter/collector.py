@@ -102,12 +102,13 @@ class FleetCollector(InstantCollector):
             self._left_out.discard(name)
         elif len(self._left_out) < MOST_ROBOTS:
             self._left_out.add(name)
+            self._states.pop(name, None)
 
     def take_state(self, name: str, value: bytes, received_unix_ms: int, *, deleted: bool) -> None:
         """Takes a robot's newest state."""
         if deleted:
             self._states.pop(name, None)
-        elif name in self._states or len(self._states) < MOST_ROBOTS:
+        elif name not in self._left_out and (name in self._states or len(self._states) < MOST_ROBOTS):
             self._states[name] = SeenState(_state(name, value), received_unix_ms)
 
     def take_use(self, use: StreamUse) -> None:

@@ -110,6 +110,8 @@ def test_the_number_of_robots_is_bounded(collector: FleetCollector) -> None:
     found = samples(collector)
     assert sum(labels[0] == "up" for labels in found) == MOST_ROBOTS
     assert found["robots_left_out",] == 5
+    report(collector, f"r{MOST_ROBOTS}")
+    assert not collector._states, "the state of one that is left out takes no place"
     collector.take_robot(f"r{MOST_ROBOTS}", b"", deleted=True)
     assert samples(collector)["robots_left_out",] == 4
 

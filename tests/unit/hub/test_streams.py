@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 
+from fleet import names
 from fleet.errors import HubError, HubReason
 from hub import streams
 
@@ -32,8 +33,8 @@ def no_quorum() -> HubError:
     return HubError(HubReason.NO_QUORUM, "the hub refuses: no suitable peers for placement, peer offline")
 
 
-async def made_by(hub: Any) -> list[str]:
-    return await streams.set_up(hub, replicas=3)
+async def made_by(hub: Any, *limits: streams.StreamLimits) -> list[str]:
+    return await streams.set_up(hub, 3, *limits)
 
 
 async def test_nodes_that_are_still_joining_are_waited_for() -> None:
@@ -49,6 +50,35 @@ async def test_but_not_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(HubError, match="peer offline"):
         await made_by(hub)
     assert 2 <= len(hub.calls) <= 4
+
+
+class _Made:
+    """A hub whose streams exist, with other limits than the usual ones."""
+
+    def __init__(self, **limits: int) -> None:
+        self.limits = limits
+        self.updates: dict[str, dict[str, Any]] = {}
+
+    async def api(self, call: str, request: Any = None) -> dict[str, Any]:
+        kind, name = call.split(".")[1:]
+        if kind == "UPDATE":
+            self.updates[name] = request
+        return {"config": {**streams.stream_configs(3)[name], **self.limits}}
+
+
+async def test_streams_without_a_limit_get_none() -> None:
+    hub = _Made(max_bytes=-1, max_age=0)
+    limits = streams.StreamLimits(events_bytes=1, events_days=1, recordings_bytes=1)
+    differences = await made_by(hub, limits)
+    assert hub.updates == {}
+    assert "fleet_events: max_bytes is -1, expected 1" in differences
+    assert f"fleet_results: max_age is 0, expected {86_400 * 10**9}" in differences
+
+
+async def test_limits_that_are_no_choice_are_differences() -> None:
+    chosen = {names.EVENTS, f"KV_{names.RECORDINGS}"}
+    differing = {each.partition(":")[0] for each in await made_by(_Made(max_bytes=1))}
+    assert differing == streams.stream_configs(3).keys() - chosen
 
 
 async def test_another_refusal_is_not_repeated() -> None:
