@@ -6,8 +6,7 @@
 | that is a run bundle, requested by hand | it keeps its place, as nothing else knows of the request |
 | the disk can't be read | again after 1, 2, 4 ... 300 s; what has happened meanwhile counts |
 | the disk can't be written | memory goes on; `disk_error` says why; a new request is refused |
-| the queue on the disk is lost | what the recorder expects to be copied is queued again |
-| an upload changes while its row is written | the row is written as it is by then |
+| an upload changes while another row is written | its row is written as it is by then |
 | more are remembered than may be | the oldest verified ones, which the recorder has as they are, go first |
 """
 

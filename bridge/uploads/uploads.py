@@ -9,6 +9,7 @@
 | the hours begin | it begins within 30 s: other robots' hours begin with them |
 | they fail three times at one recording, without progress | as a failure of that one: others go on |
 | the recording is deleted on the robot | it leaves the queue |
+| the queue on the disk is lost | what the recorder expects to be copied is queued again |
 
 kept_queue.py says what happens where the queue is full, or the bridge's disk fails.
 """

@@ -201,7 +201,7 @@ class SlowQueue(FrameQueue):
 
 
 @pytest.mark.timed
-def test_a_decoder_that_is_too_slow_shows_newer_frames_and_slows_no_other(port: int) -> None:
+def test_a_decoder_that_is_too_slow_shows_newer_frames_and_asks_for_nothing(port: int) -> None:
     """At 10 of 30 frames per second; a key frame comes every 15."""
     pieces = encode("h264", 3 * FRAMES, kbps=500, gop=KEY_FRAME_EVERY)
     lost: list[int | None] = []

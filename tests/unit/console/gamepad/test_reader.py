@@ -108,7 +108,7 @@ def test_one_without_a_cable_that_reports_nothing_new_is_released_until_it_was_u
         wait_until(lambda: reader.steering() is not None, "it holds anew")
 
 
-def test_an_untouched_device_keeps_no_other_from_being_held() -> None:
+def test_an_untouched_device_is_not_released_and_can_be_held() -> None:
     device, up = PlayedDevice(), PadInput(wireless=True, values=(0,))
     device.input = up
     with reading(device) as reader:

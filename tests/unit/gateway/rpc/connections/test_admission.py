@@ -251,7 +251,7 @@ def test_a_rush_of_strangers_has_a_share_of_their_attempts_dropped(
     assert admission.connect_policy().one_in == 1
 
 
-def test_connections_with_an_admitted_call_are_no_rush(admission: Admission) -> None:
+def test_connections_from_an_address_with_an_admitted_call_are_no_rush(admission: Admission) -> None:
     admit(admission, "10.0.0.5:1")
     admission.surplus([f"10.0.0.5:{port}" for port in range(1, 2 * BURST)])
     assert not admission.overrun
