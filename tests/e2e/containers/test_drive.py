@@ -24,7 +24,7 @@ from tests.e2e.containers.deployment import (
 from tests.support.driver_program import SPEED_MPS, driver
 from tests.support.driving import Observer
 from tests.support.robotctl import robotctl_process
-from tests.support.undisturbed import no_stall, undisturbed
+from tests.support.undisturbed import SILENT, WORKER_LOST, DisturbedError, no_stall, undisturbed
 from tests.support.waiting import wait_until
 
 # Timed: while a driver has the robot, 60 ms without a heartbeat stop it, and other tests take as much.
@@ -69,10 +69,21 @@ def drives_undisturbed(deployment: Deployment, attempt: Callable[[], None]) -> N
 
     def begun() -> None:
         free(deployment)
-        with no_stall(), answers_are_due():
-            attempt()
+        before = silences(deployment)
+        try:
+            with no_stall(), answers_are_due():
+                attempt()
+        except AssertionError as error:
+            if silences(deployment) > before:
+                raise DisturbedError(WORKER_LOST) from error
+            raise
 
     undisturbed(begun)
+
+
+def silences(deployment: Deployment) -> int:
+    """How often the guard has killed a worker for its silence."""
+    return deployment.logs("drive").count(SILENT)
 
 
 def is_available(robot: GatewayClient) -> bool:
