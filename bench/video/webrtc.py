@@ -12,10 +12,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
+from bench.progress import log
 from bench.video import reference
 from bench.video.camera import Camera
 from bench.video.plain_viewer import APPSINK, PlainViewer
 from common.gst import Gst
+from console.receiver.errors import StreamEndedError
 
 import gi  # isort: skip  # after common.gst, which prepares the process for it
 
@@ -24,12 +26,31 @@ gi.require_version("GstWebRTC", "1.0")
 from gi.repository import GstSdp, GstWebRTC  # noqa: E402
 
 _WITHIN_S: Final = 15.0
+_FRAME_WITHIN_S: Final = 5.0
+_ATTEMPTS: Final = 3
 _BIN: Final = "webrtcbin name=peer bundle-policy=max-bundle latency=0"
 
 
 @contextmanager
 def viewer(source: Camera) -> Iterator[PlainViewer]:
-    """Runs a sender and connects a viewer to it until the block ends."""
+    """Runs a sender and connects a viewer to it until the block ends; begun anew where no frame comes.
+
+    It has happened that webrtcbin negotiates, and then sends nothing for good.
+    """
+    for attempt in range(1, _ATTEMPTS + 1):
+        with _connected(source) as found:
+            try:
+                found.next_frame(_FRAME_WITHIN_S)
+            except StreamEndedError:
+                log(f"webrtcbin: no frame within {_FRAME_WITHIN_S:g} s, attempt {attempt}")
+            else:
+                yield found
+                return
+    raise RuntimeError("webrtcbin sends nothing")
+
+
+@contextmanager
+def _connected(source: Camera) -> Iterator[PlainViewer]:
     command = [sys.executable, "-m", "bench.video.webrtc", source.source]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as sender:
         assert sender.stdin

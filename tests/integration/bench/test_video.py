@@ -55,7 +55,8 @@ def test_a_cell_of_the_latency(source: Camera, robot: product.Robot, ours: bool)
     assert 0 < found.delivered_percent <= 100
 
 
-@pytest.mark.timed  # webrtcbin connects within 15 s, but not beside three others.
+@pytest.mark.timed
+@pytest.mark.alone  # Beside others, webrtcbin connects late or not at all.
 @pytest.mark.parametrize("name", peers.PEERS)
 def test_a_round_of_a_peer(source: Camera, robot: product.Robot, name: str) -> None:
     found = peers.one_round(name, source, robot, settle_s=0.5, watch_s=WATCH_S)
