@@ -38,9 +38,9 @@ _TOPIC: Final = re.compile(r"(~/|/)?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_
 """A topic name as rcl_validate_topic_name accepts it, without substitutions."""
 _LONGEST_TOPIC: Final = 247
 """Of a full name: RMW_TOPIC_MAX_NAME_LENGTH."""
-_PUT_IN_FRONT: Final[Mapping[str, int]] = {"/": 0, "~": len("/robot_gateway_doctor") - 1}
-"""By the beginning of a name, the characters that its full name has more: in place of ~ is a node's name, at
-most the doctor's; other relative names are those of the root namespace, and get a slash."""
+_PUT_IN_FRONT: Final[Mapping[str, int]] = {"/": 0, "~": len("/robot_gateway") - 1}
+"""By the beginning of a name, the characters that its full name has more: in place of ~ is the node's name;
+other relative names are those of the root namespace, and get a slash."""
 _LARGEST_IMAGE_PX: Final = 65_535
 """Of a side: more than any camera has, and within the contract's uint32."""
 _TYPE: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]*/msg/[A-Za-z][A-Za-z0-9_]*")

@@ -6,6 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from rclpy.expand_topic_name import expand_topic_name
+
 from common.errors import UserError
 from common.findings import Finding, Verdict, good, note, wrong
 from common.ros_node import (
@@ -124,11 +126,16 @@ def _discover(node: Any, sources: Sequence[SourceSettings]) -> list[tuple[Source
     """Returns what is announced for each source, once each has a publisher or a problem, or time is up."""
     until_s = time.monotonic() + DISCOVERY_S
     while True:
-        found = [(source, _publishers(node, source.topic)) for source in sources]
+        found = [(source, _publishers(node, _full_name(source.topic))) for source in sources]
         if all(each.publishers or each.problem for _, each in found) or time.monotonic() >= until_s:
             return found
         # Polled: graph events need an executor that spins.
         time.sleep(_POLL_EVERY_S)
+
+
+def _full_name(topic: str) -> str:
+    """Returns the name that the gateway's node subscribes to: ~ is its own name, not the doctor's."""
+    return str(expand_topic_name(topic, OwnNode.GATEWAY, "/"))
 
 
 def _publishers(node: Any, topic: str) -> _Announced:

@@ -35,6 +35,14 @@ def test_what_is_published_as_configured_is_good(talker: Talker) -> None:
 
 
 @pytest.mark.usefixtures("patient")
+@pytest.mark.parametrize("topic", ["~/odometry", "robot_gateway/odometry"])
+def test_a_relative_name_is_that_of_the_gateways_node(talker: Talker, topic: str) -> None:
+    talker.publisher("/robot_gateway/odometry", Odometry)
+    finding = examined(ODOMETRY.model_copy(update={"topic": topic}))["topic.odometry"]
+    assert finding.verdict is Verdict.GOOD
+
+
+@pytest.mark.usefixtures("patient")
 def test_another_type_says_which_to_configure(talker: Talker) -> None:
     talker.publisher(ODOMETRY.topic, BatteryState)
     finding = examined(ODOMETRY)["topic.odometry"]
