@@ -115,6 +115,8 @@ def state_for_viewers(state: State, *, enabled: bool, listening: Listening) -> S
 
 FIRST_RETRY_S: Final = 1.0
 LONGEST_RETRY_S: Final = 30.0
+STEADY_AFTER_S: Final = 15.0
+"""A pipeline, or a listener, that ran this long has recovered: its backoff starts again."""
 
 
 class IllegalEventError(Exception):

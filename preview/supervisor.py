@@ -57,7 +57,6 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import Final
 
-from common.backoff import Backoff
 from common.broadcast import Broadcast
 from common.errors import InvalidRequestError, NotRunningError, UserError
 from common.timer import Timer
@@ -68,8 +67,7 @@ from preview.encoders.crash_marker import CrashMarkerFile
 from preview.encoders.selection import Selection
 from preview.last_error import LastError
 from preview.lifecycle import (
-    FIRST_RETRY_S,
-    LONGEST_RETRY_S,
+    STEADY_AFTER_S,
     Event,
     Lifecycle,
     Listening,
@@ -77,6 +75,7 @@ from preview.lifecycle import (
     State,
     state_for_viewers,
 )
+from preview.listener_retry import ListenerRetry
 from preview.pipeline.events import Blame, Fault, PipelineEvents
 from preview.pipeline.plan import Plan, make_plan
 from preview.pipeline.sources import SourcePlan
@@ -94,10 +93,6 @@ _log = logging.getLogger(__name__)
 
 GRAPH: Final = "last-fault.dot"
 """File in the runtime directory: the graph of the last failed pipeline."""
-STEADY_AFTER_S: Final = 15.0
-"""A pipeline that ran this long has recovered: the backoff starts again."""
-MOST_LISTENER_RETRIES: Final = 3
-"""A listener that fails more often without a steady run fails the pipeline, unless a recording needs it."""
 ENCODER_STOP_S: Final = 0.3
 """How long the next pipeline waits for the encoder of a failed one."""
 
@@ -143,12 +138,7 @@ class Supervisor:
         self._watchers = 0
         self._unwatched_timer = Timer(self._disable_unwatched)
         self._recording: Recording | None = None
-        self._listener_backoff = Backoff(FIRST_RETRY_S, LONGEST_RETRY_S)
-        self._listener_retry = Timer(self._wake.set)
-        """Runs while a listener that failed in a pipeline that goes on waits for its retry."""
-        self._listener_lost = False
-        """Whether the listener has failed, and has been neither closed nor opened again since."""
-        self._listening_since = 0.0
+        self._listener_retry = ListenerRetry(self._wake.set)
         self._trials: asyncio.Task[bool] | None = None
         self._look: asyncio.Task[SourcePlan] | None = None
         """Plans the camera that the next pipeline starts with."""
@@ -176,8 +166,7 @@ class Supervisor:
             profile = desired.profile if desired.enabled else self._desired.profile
             if desired.enabled and not self._desired.enabled and self._lifecycle.state is State.RUNNING:
                 self._last_error.clear()  # A new session, beside a recording.
-            self._forget_listener_retry()
-            self._listener_backoff.reset()
+            self._listener_retry.reset()
             self._desired = replace(desired, profile=profile)
             self._cameras.want(desired.camera if known else "")
             camera = f", camera {self._cameras.wanted}" if len(self._cameras.names) > 1 else ""
@@ -228,7 +217,7 @@ class Supervisor:
     def _state_for_viewers(self) -> State:
         enabled, session = self._desired.enabled, self._pipeline.plan.passphrase if self._pipeline else None
         listening = Listening.NO
-        if self._listener_retry:
+        if self._listener_retry.waits:
             listening = Listening.FAILED
         elif session is not None and (session == self._desired.passphrase or not enabled):
             listening = Listening.YES
@@ -326,7 +315,7 @@ class Supervisor:
     def _close(self) -> None:
         self._closed = True
         self._desired = replace(self._desired, enabled=False)
-        self._forget_listener_retry()
+        self._listener_retry.now()
         self.record(None)
 
     async def _step(self) -> bool:
@@ -346,8 +335,8 @@ class Supervisor:
                 await pipeline.switch(profile)
             case State.RUNNING if pipeline and self._must_replace_listener(pipeline):
                 _log.info("listener: %s", "closed" if self._session is None else "opened")
-                self._listener_lost = False
-                self._listening_since = asyncio.get_running_loop().time()
+                self._listener_retry.replaced()
+                self._listener_retry.serves()
                 await pipeline.listen(self._session)
             case _:
                 return False
@@ -355,12 +344,12 @@ class Supervisor:
 
     def _must_replace_listener(self, pipeline: Pipeline) -> bool:
         # A lost one has the right passphrase, once its retry is due.
-        return self._listener_lost or pipeline.plan.passphrase != self._session
+        return self._listener_retry.is_lost or pipeline.plan.passphrase != self._session
 
     @property
     def _session(self) -> str | None:
         """The passphrase that the listener is to have at present; None: there is to be none."""
-        return None if self._listener_retry else self._desired.session
+        return None if self._listener_retry.waits else self._desired.session
 
     async def _find_encoder(self) -> bool:
         """Runs trials until an encoder works that has not failed; False when none does, or when disabled."""
@@ -408,8 +397,8 @@ class Supervisor:
             return
         self._retry_now = False
         self._marker.set(encoder.name, proven=self._encoders.proven)
-        self._forget_listener_retry()
-        self._listener_lost = False
+        self._listener_retry.now()
+        self._listener_retry.replaced()
         if self._recording:
             pipeline.record(self._recording.take)
         await pipeline.start()
@@ -474,7 +463,8 @@ class Supervisor:
 
     def first_frame(self) -> None:
         """Handles the first frame of the pipeline."""
-        self._running_since = self._listening_since = asyncio.get_running_loop().time()
+        self._running_since = asyncio.get_running_loop().time()
+        self._listener_retry.serves()
         self._move(Event.FIRST_FRAME)
         if self._pipeline:
             self._cameras.delivers(self._pipeline.plan.source.camera)
@@ -504,29 +494,15 @@ class Supervisor:
         return any(self._live_and_starting)
 
     def listener_failed(self, fault: Fault) -> bool:
-        """Handles the fault of a listener; whether the pipeline goes on without it, until it is opened again.
-
-        For viewers it does so while it runs, until the listener has failed too often; for a recording always.
-        """
+        """Handles the fault of a listener; whether the pipeline goes on, and it is opened again."""
         running = self._lifecycle.state is State.RUNNING
-        steady = running and asyncio.get_running_loop().time() - self._listening_since > STEADY_AFTER_S
-        if steady:
-            self._listener_backoff.reset()
-        too_often = self._listener_backoff.failures >= MOST_LISTENER_RETRIES
-        if self._recording is None and (not running or too_often):
+        if not self._listener_retry.failed(running=running, recorded=self._recording is not None):
             return False
         self._last_error.report(fault.text)
         _log.info("the pipeline goes on without a listener")
-        self._listener_lost = True
-        self._listener_retry.start(0.0 if steady else self._listener_backoff.next_s())
         self._wake.set()
         self.changes.notify_all()
         return True
-
-    def _forget_listener_retry(self) -> None:
-        """Tries the listener again now, if it waits for that."""
-        if self._listener_retry.cancel():
-            self._wake.set()
 
     def failed(self, fault: Fault) -> None:
         """Handles the fault of a pipeline, or of the attempt to build one."""

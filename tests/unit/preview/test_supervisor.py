@@ -17,11 +17,11 @@ from preview.encoders.catalogue import CATALOGUE, Encoder
 from preview.encoders.crash_marker import CrashMarkerFile
 from preview.encoders.probe import TrialProber, Verdict
 from preview.encoders.selection import Selection
-from preview.lifecycle import Counters, Reason, State
+from preview.lifecycle import STEADY_AFTER_S, Counters, Reason, State
 from preview.pipeline import sources
 from preview.pipeline.events import AccessUnit, Blame, Fault, HungError
 from preview.pipeline.sources import SourcePlan
-from preview.supervisor import ENCODER_STOP_S, GRAPH, STEADY_AFTER_S, Supervisor
+from preview.supervisor import ENCODER_STOP_S, GRAPH, Supervisor
 from preview.values import ActualState, DesiredState, Profile
 from tests.support.pipeline_double import FIRST_FRAME_S, SHOW_S, STOP_DEADLINE_S, PipelineDoubles, Script
 from tests.support.virtual_time import in_virtual_time
