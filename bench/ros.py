@@ -2,8 +2,8 @@
 
 Publisher and readers are processes of their own, and all figures count the whole reading process. The
 references are an ordinary node, whose callbacks convert each message, and the cheapest honest one, whose
-callbacks only keep the newest message, which a timer converts as often as our sampler runs. Fast DDS's own
-threads need about 10 us per message in any case; both parts are logged.
+callbacks only keep the newest message, which a timer converts as often as our sampler runs. What Fast DDS's
+own threads need for each message is part of all figures, and logged.
 """
 
 import os

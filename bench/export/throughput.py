@@ -29,7 +29,7 @@ def rows(robot: ExportingRobot, _wanted: set[str]) -> list[Row]:
     return [
         Row(
             name="export.throughput",
-            what="a recording copied through recorder and gateway, against a bare gRPC stream of the same"
+            what="a recording copied by way of the gateway, against a bare gRPC stream of the same"
             " bytes from memory to the same client, in turns",
             unit="MiB/s",
             values=ours,
