@@ -19,8 +19,8 @@ RELEASED_S: Final = 2.0
 MAX_LANES: Final = 3
 """Of a session. A packet that is lost with its repetition holds a lane up for longer than a command is valid:
 in an hour of virtual time on a link that loses 10 %, two lanes at once stopped a driver 13 times, three not
-once (the model of tests/unit/console/client/test_lossy_lanes.py, seeds 1 to 6; on real connections two did so
-eight times in ten minutes)."""
+once (the model of tests/unit/console/client/test_lossy_lanes.py, seeds 1 to 6); on real connections, two did
+so eight times in ten minutes, three not once (`drive.false_stops_very_lossy`)."""
 LANE_SILENT_S: Final = 1.0
 """A lane that has brought nothing for so long makes room for another one of its session: fifty commands were
 due on it. A driver gives up a connection that has vanished, and opens the next, before the gateway does."""
