@@ -50,9 +50,13 @@ REMARKS: Final[Mapping[tuple[str, ...], str]] = {
         "srtsink listens with a backlog of 1, so some of ten simultaneous SRT handshakes are refused; these"
         " viewers redial after 100 ms, and the slowest shows it."
     ),
+    ("video.viewer_cpu",): (
+        "a viewer costs 0.2 to 0.4 % of a core, and the rounds of the reference alone are 0.14 to 0.46 %: on"
+        " this machine windows of 5 s differ by more than a bar of 1.25 allows."
+    ),
     ("video.ros_camera_cpu",): (
-        "what a topic costs more is the tap, 11 to 14 % of a core: it takes 41 MB/s out of Fast DDS and hands"
-        " them to the preview, which needs as much as with shmsrc."
+        "what a topic costs more is the tap, 12 to 15 % of a core: it takes 41 MB/s out of Fast DDS, over"
+        " UDP, and hands them to the preview, which needs up to 4 points more than with shmsrc."
     ),
     ("video.age_far_ms",): (
         "a frame has some ten packets here, so one in four loses one, and a lost packet comes again a round"
