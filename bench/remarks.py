@@ -101,8 +101,8 @@ class Older:
 
 OLDER: Final = (
     Older(
-        ("ros.*", "drive.*", "video.ros_camera_cpu"),
-        frozenset({"8f53ae69", "648d6af8", "b15aab27"}),
+        ("ros.*", "drive.*"),
+        frozenset({"8f53ae69", "648d6af8"}),
         "measured over the shared memory of Fast DDS. Containers and systemd units have"
         " `ROBOT_ROS_TRANSPORT=udp`, and since commit 333854a8 these rows have it, too: figures measured"
         " since then are not comparable with these.",
@@ -112,12 +112,6 @@ OLDER: Final = (
         frozenset({"648d6af8"}),
         "measured with two lanes, against one where a row compares. Since commit 11d38fb6 a session has"
         " three.",
-    ),
-    Older(
-        ("video.age_60_delivered_percent",),
-        frozenset({"b15aab27"}),
-        "measured as the rate at which frames came, of 60 a second, which a late first frame raises beyond"
-        " 100 %. Since then the frames that came are counted by their capture times.",
     ),
 )
 """Such a remark is no reason why a row misses its bar. It is on the page until the rows are measured anew."""
