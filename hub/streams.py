@@ -43,11 +43,11 @@ class StreamLimits:
         return {key: value for key, value in limits.items() if value is not None}
 
 
-_ANY: Final = StreamLimits(events_bytes=1, events_days=1, recordings_bytes=1)
 EVENTS_BYTES: Final = 8192 * _MIB
 EVENTS_DAYS: Final = 30
 RECORDINGS_BYTES: Final = 1024 * _MIB
 """Defaults, which suit a hundred robots on one disk of 32 GB."""
+_DEFAULTS: Final = StreamLimits(EVENTS_BYTES, EVENTS_DAYS, RECORDINGS_BYTES)
 
 
 def stream_configs(replicas: int, limits: StreamLimits = StreamLimits()) -> dict[str, dict[str, Any]]:
@@ -198,7 +198,7 @@ async def _make(hub: Hub, name: str, config: dict[str, Any], chosen: Mapping[str
     if changed != actual:
         await hub.api(f"STREAM.UPDATE.{name}", changed)
     # A limit that is not chosen now is as it was chosen before.
-    free = _ANY.chosen(name).keys() - chosen.keys()
+    free = _DEFAULTS.chosen(name).keys() - chosen.keys()
     expected = {key: value for key, value in config.items() if key not in free}
     return _differences(name, expected, changed)
 
