@@ -42,12 +42,13 @@ class ListenerRetry:
         return bool(self._timer)
 
     def serves(self) -> None:
-        """Takes that the listener serves from now on: with a first frame, or opened again."""
+        """Takes that the listener serves from now on."""
         self._serves_since_s = asyncio.get_running_loop().time()
 
     def replaced(self) -> None:
-        """Takes that the listener was closed or opened anew."""
+        """Takes that the listener was closed or opened anew, and if so serves from now on."""
         self.is_lost = False
+        self.serves()
 
     def failed(self, *, running: bool, recorded: bool) -> bool:
         """Takes a failure of the listener.

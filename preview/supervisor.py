@@ -336,7 +336,6 @@ class Supervisor:
             case State.RUNNING if pipeline and self._must_replace_listener(pipeline):
                 _log.info("listener: %s", "closed" if self._session is None else "opened")
                 self._listener_retry.replaced()
-                self._listener_retry.serves()
                 await pipeline.listen(self._session)
             case _:
                 return False

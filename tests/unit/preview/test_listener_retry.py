@@ -25,7 +25,6 @@ class Listener:
         self._due.clear()
         assert not self.retry.waits
         self.retry.replaced()
-        self.retry.serves()
         return loop.time() - failed_s
 
     def fails(self, *, running: bool = True, recorded: bool = False) -> bool:
