@@ -25,10 +25,9 @@ PROGRAMS: Mapping[type[Settings], Any] = {
 
 
 def ros_takes(topic: str) -> bool:
-    """Whether each of our nodes can have a topic of this name."""
+    """Whether a topic can have this name. Only the gateway takes relative ones: ~ is its node."""
     try:
-        for node in OwnNode:
-            validate_full_topic_name(expand_topic_name(topic, node, "/"))
+        validate_full_topic_name(expand_topic_name(topic, OwnNode.GATEWAY, "/"))
     except InvalidTopicNameException:
         return False
     return True
