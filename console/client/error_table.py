@@ -13,7 +13,8 @@ from console.client import errors
 ERRORS: Final[Mapping[grpc.StatusCode, type[errors.GatewayError]]] = {
     # An error with the code OK is a defect of the server.
     grpc.StatusCode.OK: errors.GatewayFailed,
-    grpc.StatusCode.CANCELLED: errors.Cancelled,
+    # A gateway that stops, or has too many calls. One that this client cancels itself has no code.
+    grpc.StatusCode.CANCELLED: errors.Unreachable,
     grpc.StatusCode.UNKNOWN: errors.GatewayFailed,
     grpc.StatusCode.INVALID_ARGUMENT: errors.InvalidRequest,
     grpc.StatusCode.DEADLINE_EXCEEDED: errors.DeadlineExceeded,
@@ -179,6 +180,11 @@ def error_from(failure: grpc.RpcError, target: str, timeout_s: float) -> errors.
     details = printable(call.details() or code.name)
     if code is grpc.StatusCode.UNAVAILABLE and (why := _message_for(details, _NOT_TRUSTED)):
         return errors.NotTrusted(f"what answers at {target} is not trusted: {why}")
+    if code is grpc.StatusCode.CANCELLED:
+        return errors.Unreachable(
+            f"the robot gateway at {target} cancelled the call: it stops, or has more calls than it can take",
+            "Try again",
+        )
     family = REASONS.get(refusal.reason, ERRORS[code])
     error = family(_sentence(family, details, target, timeout_s), _ADVICE.get(refusal.reason))
     error.reason, error.retry_after_s = printable(refusal.reason), refusal.retry_after_s

@@ -37,7 +37,7 @@ class GatewayError(UserError):
 
 
 class Unreachable(GatewayError):
-    """No gateway answers there: nothing listens, no route, no such name, or the link went silent."""
+    """No gateway answers there: nothing listens, no route, no such name, a silent link, or one that stops."""
 
     kind = "unreachable"
     ends_with = ExitCode.UNREACHABLE
@@ -104,7 +104,7 @@ class GatewayFailed(GatewayError):
 
 
 class Cancelled(GatewayError):
-    """The call was cancelled by this program, or the client was closed."""
+    """The client was closed by this program."""
 
     kind = "cancelled"
     advice = "Open a new client and repeat the call"

@@ -130,11 +130,10 @@ class GrpcTransport:
 
     def end_of_stream(self, failure: grpc.RpcError | None) -> GatewayError:
         """Returns the error for a stream that the other side ended; without failure, for an orderly end."""
-        error = error_from(failure, self._target, 0.0) if failure else None
-        if error is None or isinstance(error, Cancelled):
-            # A gateway that stops completes its streams or cancels them.
+        if failure is None:
+            # As a gateway that stops completes its streams.
             return Unreachable(f"no robot gateway reached at {self._target}: it ended the stream")
-        return error
+        return error_from(failure, self._target, 0.0)
 
     async def close(self) -> None:
         """Closes the channel. Pending calls and streams end with `Cancelled`."""

@@ -58,6 +58,7 @@ from tests.support.undisturbed import no_stall, undisturbed
 from tests.support.waiting import wait_until
 
 UNAVAILABLE = (grpc.StatusCode.UNAVAILABLE, "the robot is starting")
+CANCELLED = (grpc.StatusCode.CANCELLED, "too many calls")
 HURRIED = ClientOptions(answer_within_s=0.3, preview_within_s=0.3)
 # Much more than any promise below and much less than 20 s, for which the double holds a call.
 AT_LAST_S = 8.0
@@ -215,6 +216,17 @@ def test_a_robot_that_is_not_ready_is_asked_again(
         assert robot.retries == 2
 
 
+def test_a_call_that_the_gateway_cancelled_is_made_again(
+    face: type[Face], port: int, double: GatewayDouble, ask: Ask
+) -> None:
+    double.failures += [CANCELLED, UNAVAILABLE]
+    patient = replace(PATIENT, backoff=Backoff(first_s=0.01, give_up_after_s=30))
+    with face(at(port), patient) as robot:
+        ask(robot)
+        assert len(double.calls) == 3
+        assert robot.retries == 2
+
+
 def test_the_pauses_between_attempts_grow(face: type[Face], port: int, double: GatewayDouble) -> None:
     patient = replace(PATIENT, backoff=Backoff(give_up_after_s=30))
     double.failures += [UNAVAILABLE] * 4
@@ -256,7 +268,7 @@ def test_what_must_not_happen_twice_is_asked_once(
 
 @pytest.mark.parametrize(
     "code",
-    [code for code in grpc.StatusCode if code not in {grpc.StatusCode.OK, grpc.StatusCode.UNAVAILABLE}],
+    [code for code in grpc.StatusCode if ERRORS[code] is not Unreachable and code is not grpc.StatusCode.OK],
     ids=lambda code: code.name,
 )
 def test_every_other_failure_is_final_and_has_a_remedy(

@@ -53,8 +53,9 @@ def all_errors(above: type[errors.GatewayError]) -> set[type[errors.GatewayError
 
 def test_the_table_is_total_in_both_directions() -> None:
     assert set(ERRORS) == set(grpc.StatusCode)
-    # Whom a connection led to is known before any code of a gateway's own comes.
-    assert set(ERRORS.values()) | {errors.NotTrusted} == all_errors(errors.GatewayError)
+    # Whom a connection led to is known before any code of a gateway's own comes, and that a client was closed
+    # without one.
+    assert set(ERRORS.values()) | {errors.NotTrusted, errors.Cancelled} == all_errors(errors.GatewayError)
 
 
 @pytest.mark.parametrize(
@@ -115,6 +116,15 @@ def test_the_robots_own_words_come_through() -> None:
     assert said(grpc.StatusCode.INVALID_ARGUMENT, "profile 99 is unknown").what.endswith(
         "profile 99 is unknown"
     )
+
+
+def test_a_call_that_the_gateway_cancelled_is_not_one_of_a_closed_client() -> None:
+    error = said(grpc.StatusCode.CANCELLED, "Received RST_STREAM with error code 8")
+    assert type(error) is errors.Unreachable
+    assert error.what == (
+        "the robot gateway at robot:50051 cancelled the call: it stops, or has more calls than it can take"
+    )
+    assert error.remedy == "Try again"
 
 
 def test_without_details_the_code_speaks() -> None:
