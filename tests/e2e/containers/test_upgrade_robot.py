@@ -49,6 +49,15 @@ volumes:
   state:
 # VERSION
 """
+DROPPED = """
+  dropped:
+    image: robot-gateway:${TAG:-latest}
+    pull_policy: never
+    network_mode: none
+    init: true
+    command: [sleep, "600"]
+"""
+"""A service that a release has no more."""
 DOCKERFILE = """
 FROM debian:bookworm-slim AS whole
 RUN programs="/bin/sh /bin/cat /bin/grep /bin/sleep /bin/touch /usr/bin/test" && mkdir /small && \\
@@ -112,6 +121,13 @@ class Robot:
         )  # fmt: skip
         self.tags.add(tag)
 
+    def tags_of_images(self) -> set[str]:
+        listed = subprocess.run(
+            ["docker", "image", "ls", "--format", "{{.Tag}}", "robot-gateway"],
+            capture_output=True, text=True, timeout=30, check=True,
+        ).stdout.split()  # fmt: skip
+        return self.tags & set(listed)
+
     def release(self, version: str, *, healthy: bool = True, revision: str = "", platform: str = "") -> Path:
         """A release as scripts/release makes it, with these images."""
         made = self.releases / version
@@ -151,6 +167,15 @@ class Robot:
             capture_output=True, text=True, timeout=200, check=False,
         )  # fmt: skip
 
+    def services(self) -> set[str]:
+        """Those that run."""
+        listed = subprocess.run(
+            ["docker", "ps", "--filter", f"label=com.docker.compose.project={self.project}",
+             "--format", '{{.Label "com.docker.compose.service"}}'],
+            capture_output=True, text=True, timeout=30, check=True,
+        )  # fmt: skip
+        return set(listed.stdout.split())
+
     def started(self) -> list[str]:
         """The versions that ever started, from the volume that outlives them."""
         return self.compose("exec", "-T", "gateway", "cat", "/state/log").split()
@@ -172,13 +197,8 @@ class Robot:
             ["docker", "compose", "--profile", "*", "down", "--volumes", "--timeout", "1"],
             cwd=self.directory, capture_output=True, timeout=120, check=False,
         )  # fmt: skip
-        listed = subprocess.run(
-            ["docker", "image", "ls", "--format", "{{.Tag}}", "robot-gateway"],
-            capture_output=True, text=True, check=True,
-        ).stdout.split()  # fmt: skip
-        mine = [tag for tag in listed if tag in {*self.tags, "before-9.1.0"}]
-        if mine:
-            names = [f"robot-gateway:{tag}" for tag in mine]
+        self.tags.add("before-9.1.0")
+        if names := [f"robot-gateway:{tag}" for tag in self.tags_of_images()]:
             subprocess.run(["docker", "image", "rm", "--force", *names], capture_output=True, check=True)
 
 
@@ -260,6 +280,34 @@ def test_a_service_that_was_started_by_hand_comes_along(robot: Robot) -> None:
     upgraded = robot.upgrade(robot.release("9.1.0"))
     assert upgraded.returncode == 0, upgraded.stderr
     assert robot.running("extra") == "9.1.0"
+
+
+def test_a_service_that_the_release_does_not_have_is_stopped(robot: Robot) -> None:
+    robot.begin()
+    (robot.directory / "compose.yaml").write_text(
+        COMPOSE.replace("volumes:\n  state:", f"{DROPPED}volumes:\n  state:")
+    )
+    robot.compose("up", "--detach")
+    upgraded = robot.upgrade(robot.release("9.1.0"))
+    assert upgraded.returncode == 0, upgraded.stderr
+    assert robot.services() == {"gateway"}
+    assert robot.upgrade("--rollback").returncode == 0
+    assert robot.services() == {"gateway", "dropped"}
+
+
+def test_only_what_runs_and_the_way_back_take_room(robot: Robot) -> None:
+    """The defect: images of every version stayed, until a disk was full and no release could be loaded."""
+    robot.begin()
+    first, second = robot.release("9.1.0"), robot.release("9.2.0")
+    assert robot.upgrade(first).returncode == 0
+    assert robot.tags_of_images() == {"1.0.0", "9.1.0"}
+    upgraded = robot.upgrade(second)
+    assert upgraded.returncode == 0, upgraded.stderr
+    assert robot.tags_of_images() == {"9.1.0", "9.2.0"}
+    assert [each.name for each in (robot.directory / ".upgrade/trees").iterdir()] == ["9.1.0"]
+    assert robot.upgrade("--rollback").returncode == 0
+    assert robot.running() == "9.1.0"
+    assert robot.tags_of_images() == {"9.1.0", "9.2.0"}
 
 
 def test_a_release_that_does_not_become_healthy_is_left_by_itself(robot: Robot) -> None:
