@@ -1,6 +1,7 @@
 """The command line of scripts/release."""
 
 import argparse
+import os
 import sys
 import tempfile
 import tomllib
@@ -38,12 +39,19 @@ def main() -> int:
         action="store_true",
         help="a robot that runs by compose.yaml can't be upgraded to it",
     )
+    parser.add_argument(
+        "--platform",
+        choices=list(images.PLATFORMS),
+        default="linux/amd64",
+        help="of the robots that the images are for; linux/amd64 by default",
+    )
     options = parser.parse_args()
     output = (options.output or _ROOT / f"build/robot-gateway-{options.version}").absolute()
     try:
         commit = _permitted(options.version)
         pythons = tuple(options.python or _PYTHONS)
-        _make(options.version, commit, output, pythons, with_images=not options.without_images)
+        platform = None if options.without_images else options.platform
+        _make(options.version, commit, output, pythons, platform)
     except UserError as error:
         print(f"release: {error}", file=sys.stderr)
         return int(error.exit_code)
@@ -67,6 +75,7 @@ def _permitted(version: str) -> git.Commit:
         has_frozen_schema=(_ROOT / f"proto/locked/{version}.binpb").is_file(),
         revision=commit.revision,
         tagged_revision=git.tagged(_ROOT, f"v{version}"),
+        machine=os.uname().machine,
     )
     if found := refusals(version, facts):
         raise UserError(f"{version} can't be released: {'; '.join(found)}")
@@ -79,9 +88,9 @@ def _project_version() -> str:
 
 
 def _make(
-    version: str, commit: git.Commit, output: Path, pythons: tuple[str, ...], *, with_images: bool
+    version: str, commit: git.Commit, output: Path, pythons: tuple[str, ...], platform: str | None
 ) -> None:
-    """Makes all parts beside `output`, which appears when all of them are complete."""
+    """Makes all parts beside `output`, which appears when all are complete; no images without a platform."""
     if output.exists():
         raise UserError(f"{output} exists", f"Type: rm -r {output}, or name another one with --output")
     output.parent.mkdir(parents=True, exist_ok=True)
@@ -117,27 +126,29 @@ def _make(
             made / "sbom" / f"without_docker-{version}.cdx.json",
             commit.epoch_s,
         )
-        if with_images:
-            _add_images(made, version, commit)
-        _write_texts(made, tree, version, commit)
+        tag = _add_images(made, version, commit, platform) if platform else ""
+        _write_texts(made, tree, version, commit, tag)
         write_sums(made)
         made.rename(output)
 
 
-def _add_images(made: Path, version: str, commit: git.Commit) -> None:
-    _say("building the images")
-    images.build(_ROOT, version)
+def _add_images(made: Path, version: str, commit: git.Commit, platform: str) -> str:
+    """Returns their tag."""
+    _say(f"building the images for {platform}")
+    tag = images.build(_ROOT, version, platform)
     _say("saving them, and listing what is in them")
     (made / "images").mkdir()
-    for image in images.save(_ROOT, version, made / "images"):
+    for image in images.save(_ROOT, tag, made / "images"):
         name = image.partition(":")[0]
         image_sbom.write_of_image(image, version, made / f"sbom/{name}-{version}.cdx.json", commit.epoch_s)
+    return tag
 
 
-def _write_texts(made: Path, tree: Path, version: str, commit: git.Commit) -> None:
+def _write_texts(made: Path, tree: Path, version: str, commit: git.Commit, tag: str) -> None:
     changes = section((tree / "CHANGELOG.md").read_text(encoding="utf-8"), version) or ("", "")
     (made / "CHANGES.md").write_text(f"# {version} - {changes[0]}\n\n{changes[1]}\n", encoding="utf-8")
-    (made / "RELEASE").write_text(f"VERSION={version}\nREVISION={commit.revision}\n", encoding="utf-8")
+    facts = f"VERSION={version}\nREVISION={commit.revision}\n" + (f"TAG={tag}\n" if tag else "")
+    (made / "RELEASE").write_text(facts, encoding="utf-8")
     template = (tree / "scripts/release_program/INSTALL.md").read_text(encoding="utf-8")
     (made / "INSTALL.md").write_text(template.replace("VERSION", version), encoding="utf-8")
 

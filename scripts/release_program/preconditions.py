@@ -23,6 +23,7 @@ class Facts:
         has_frozen_schema: whether the version's schema is in proto/locked.
         revision: the commit that is checked out.
         tagged_revision: the commit that the version's tag names; "" without that tag.
+        machine: this computer's processor, as uname(1) has it.
     """
 
     project_version: str
@@ -31,6 +32,7 @@ class Facts:
     has_frozen_schema: bool
     revision: str
     tagged_revision: str
+    machine: str
 
 
 def refusals(version: str, facts: Facts) -> list[str]:
@@ -38,6 +40,8 @@ def refusals(version: str, facts: Facts) -> list[str]:
     if not _VERSION.fullmatch(version):
         return [f"{version!r} is no version: MAJOR.MINOR.PATCH, for example 1.4.0"]
     found = []
+    if facts.machine != "x86_64":
+        found.append(f"this computer is {facts.machine}, and a release is made on x86-64; type it there")
     if version != facts.project_version:
         found.append(f"pyproject.toml has version {facts.project_version}: set it to {version}")
     found += _of_changelog(version, facts.changelog)

@@ -128,28 +128,31 @@ class Robot:
         ).stdout.split()  # fmt: skip
         return self.tags & set(listed)
 
-    def release(self, version: str, *, healthy: bool = True, revision: str = "", platform: str = "") -> Path:
-        """A release as scripts/release makes it, with these images."""
-        made = self.releases / version
+    def release(
+        self, version: str, *, healthy: bool = True, revision: str = "", platform: str = "", tag: str = ""
+    ) -> Path:
+        """A release as scripts/release makes it, with these images; without a tag, as it made them once."""
+        made, named = self.releases / version, f"TAG={tag}\n" if tag else ""
+        tag = tag or version
         (made / "images").mkdir(parents=True)
         if platform:
-            self.foreign_image(version, platform)
+            self.foreign_image(tag, platform)
         else:
-            self.image(version, version, healthy=healthy, revision=revision)
+            self.image(tag, version, healthy=healthy, revision=revision)
         saved = subprocess.run(
-            ["docker", "save", f"robot-gateway:{version}"], capture_output=True, timeout=120, check=True
+            ["docker", "save", f"robot-gateway:{tag}"], capture_output=True, timeout=120, check=True
         ).stdout
-        with gzip.open(made / f"images/robot-images-{version}.tar.gz", "wb", compresslevel=1) as file:
+        with gzip.open(made / f"images/robot-images-{tag}.tar.gz", "wb", compresslevel=1) as file:
             file.write(saved)
-        (made / "images/IMAGES").write_text(f"robot-gateway:{version} sha256:0\n")
+        (made / "images/IMAGES").write_text(f"robot-gateway:{tag} sha256:0\n")
         self.write_tree(made / "tree", version)
         with tarfile.open(made / f"robot-gateway-{version}.tar.gz", "w:gz") as file:
             file.add(made / "tree", f"robot-gateway-{version}")
         subprocess.run(["rm", "-r", made / "tree"], check=True)
-        (made / "RELEASE").write_text(f"VERSION={version}\nREVISION={version}\n")
+        (made / "RELEASE").write_text(f"VERSION={version}\nREVISION={version}\n{named}")
         write_sums(made)
         # As on a robot that has never seen it.
-        subprocess.run(["docker", "image", "rm", f"robot-gateway:{version}"], capture_output=True, check=True)
+        subprocess.run(["docker", "image", "rm", f"robot-gateway:{tag}"], capture_output=True, check=True)
         return made
 
     def compose(self, *words: str) -> str:
@@ -243,6 +246,19 @@ def test_up_and_back_and_forth_with_state_and_settings_kept(robot: Robot) -> Non
     assert forth.returncode == 0, forth.stderr
     assert robot.started() == ["1.0.0", "9.1.0", "1.0.0", "9.1.0"]
     assert robot.snapshot() == after
+
+
+def test_the_images_of_a_release_have_the_tag_that_it_names(robot: Robot) -> None:
+    """As those for another processor than that of the computer that made it."""
+    robot.begin()
+    upgraded = robot.upgrade(robot.release("9.1.0", tag="9.1.0-arm64"))
+    assert upgraded.returncode == 0, upgraded.stderr
+    assert "9.1.0-arm64 is in use. Back to 1.0.0" in upgraded.stderr
+    assert robot.running() == "9.1.0"
+    assert "TAG=9.1.0-arm64\n" in (robot.directory / ".env").read_text()
+    assert "is in use here already" in robot.upgrade(robot.releases / "9.1.0").stderr
+    assert robot.upgrade("--rollback").returncode == 0
+    assert robot.running() == "1.0.0"
 
 
 @pytest.mark.parametrize("tag", ["latest", "latest-arm64"])

@@ -24,7 +24,7 @@ CHANGELOG = """# Changelog
 
 ### Added
 """
-GOOD = Facts("1.2.0", CHANGELOG, (), True, "a" * 40, "")
+GOOD = Facts("1.2.0", CHANGELOG, (), True, "a" * 40, "", "x86_64")
 
 
 def test_a_clean_commit_with_its_section_may_be_released() -> None:
@@ -48,6 +48,11 @@ def test_what_is_no_version_is_refused_alone(version: str) -> None:
     [
         ("1.2.0", {"project_version": "1.1.0"}, "pyproject.toml has version 1.1.0: set it to 1.2.0"),
         ("1.2.0", {"changed_files": ("a", "b")}, "not committed: a, b"),
+        (
+            "1.2.0",
+            {"machine": "aarch64"},
+            "this computer is aarch64, and a release is made on x86-64; type it there",
+        ),
         ("1.2.0", {"changed_files": tuple("abcdefg")}, "not committed: a, b, c, d, e and 2 more"),
         (
             "1.2.0",
