@@ -16,7 +16,8 @@ def home(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def install(home: Path, *options: str) -> "subprocess.CompletedProcess[str]":
+def install(home: Path, *options: str, programs: Path | None = None) -> "subprocess.CompletedProcess[str]":
+    """Runs the script; `programs` are found before those of the system."""
     dropped = {"XDG_DATA_HOME", "XDG_CONFIG_HOME", "VIRTUAL_ENV", "PYTHONPATH"}
     environment = {name: value for name, value in os.environ.items() if name not in dropped}
     return subprocess.run(
@@ -25,7 +26,9 @@ def install(home: Path, *options: str) -> "subprocess.CompletedProcess[str]":
         text=True,
         timeout=DONE_WITHIN_S,
         # The homes are new, what is downloaded need not be.
-        env=environment | {"HOME": str(home), "UV_CACHE_DIR": str(Path.home() / ".cache/uv")},
+        env=environment
+        | {"HOME": str(home), "UV_CACHE_DIR": str(Path.home() / ".cache/uv")}
+        | ({"PATH": f"{programs}:{os.environ['PATH']}"} if programs else {}),
         cwd="/",
         check=False,
     )
@@ -64,6 +67,55 @@ def test_what_others_put_there_is_not_touched(home: Path) -> None:
         assert ended.returncode == 1
         assert ended.stderr == f"install-console: {link} is something else. Move it away and try again\n"
     assert link.read_text() == "mine"
+
+
+def program(directory: Path, name: str, body: str) -> None:
+    (directory / name).write_text(f"#!/bin/sh\n{body}\n")
+    (directory / name).chmod(0o755)
+
+
+@pytest.fixture
+def arm64(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Programs that say what they would on arm64 with Debian 12."""
+    directory = tmp_path_factory.mktemp("programs")
+    program(directory, "uname", "echo aarch64")
+    program(directory, "getconf", "echo glibc 2.36")
+    return directory
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        (
+            (),
+            "on arm64, the windows need the C library 2.39 of Ubuntu 24.04 or Debian 13, and this is 2.36. "
+            "Type: scripts/install-console --without-video",
+        ),
+        (
+            ("--release", "/nowhere"),
+            "the wheels of a release are for x86-64, and this computer has arm64. With network, "
+            "leave out --release",
+        ),
+    ],
+)
+def test_on_arm64_it_says_what_does_not_exist(
+    home: Path, arm64: Path, options: tuple[str, ...], why: str
+) -> None:
+    """The defect: pip found no wheel, and the script asked for the network."""
+    ended = install(home, *options, programs=arm64)
+    assert (ended.returncode, ended.stderr) == (1, f"install-console: {why}\n")
+    assert not list(home.iterdir())
+
+
+def test_on_arm64_with_a_newer_system_it_goes_on(home: Path, arm64: Path) -> None:
+    """To the next step, which is to install packages."""
+    program(arm64, "getconf", "echo glibc 2.39")
+    program(arm64, "dpkg-query", "exit 1")
+    program(arm64, "id", "echo 0")
+    program(arm64, "apt-get", "echo no packages today; exit 1")
+    ended = install(home, programs=arm64)
+    assert ended.returncode == 1
+    assert "apt-get failed" in ended.stderr
 
 
 def test_an_option_it_does_not_know_changes_nothing(home: Path) -> None:
