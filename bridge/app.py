@@ -4,6 +4,7 @@ import asyncio
 import logging
 import secrets
 from contextlib import aclosing
+from datetime import UTC, datetime
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,7 @@ from bridge.rpc.servicer import SERVICE, BridgeServicer
 from bridge.sender import Sender
 from bridge.state_sender import StateSender
 from bridge.uploading import NoUploads, QueuedUploads, Uploading, apply_rule
+from bridge.uploads import hours
 from common import bind, heartbeat, rpc
 from common.broadcast import Broadcast
 from common.health import Health
@@ -44,6 +46,8 @@ async def serve(settings: BridgeSettings, stop: asyncio.Event) -> None:
     Raises:
         UserError: the socket can't be used, or a file of the robot's enrolment can't be read.
     """
+    if hours.are_doubtful(settings.uploads, datetime.now(UTC)):
+        _log.warning("uploads.hours: %s. %s", hours.DOUBT, hours.REMEDY)
     robot, run_id = settings.hub.robot, secrets.token_hex(_RUN_ID_BYTES)
     async with (
         outbox(settings.root, settings.outbox.max_bytes) as kept,

@@ -1,5 +1,6 @@
 """`robot-bridge`: the command line of the bridge, and of the hub's administration."""
 
+from datetime import UTC, datetime
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -9,6 +10,7 @@ import typer
 from typer.main import get_command
 
 from bridge.config import BridgeSettings
+from bridge.uploads import hours
 from common import config, logs, program
 from common.command_line import read_plainly
 from common.errors import ExitCode, UserError
@@ -48,7 +50,10 @@ def check(config_file: _Config = None, in_effect: PrintOption = False, schema: S
         # Late: the other commands need none of this.
         from bridge.files import check_files  # noqa: PLC0415
 
-        check_files(config.load(BridgeSettings, config_file))
+        settings = config.load(BridgeSettings, config_file)
+        check_files(settings)
+        for line in hours.sentences(settings.uploads, datetime.now(UTC)):
+            typer.echo(line, err=True)
     check_settings(BridgeSettings, config_file, in_effect=in_effect, schema=schema)
 
 

@@ -3,9 +3,10 @@
 ARG DEBIAN_IMAGE=debian:bookworm-slim
 
 FROM ${DEBIAN_IMAGE} AS system
-# The certificates: of stores whose authority the world knows (uploads.ca names any other).
+# The certificates: of stores whose authority the world knows (uploads.ca names any other). tzdata: the zones of
+# uploads.time_zone; where it is not in the base it would ask for the computer's.
 RUN apt-get update \
- && apt-get install -y --no-install-recommends ca-certificates python3 tini \
+ && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends ca-certificates python3 tini tzdata \
  && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
 
 FROM ${DEBIAN_IMAGE} AS built

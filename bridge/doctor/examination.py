@@ -3,12 +3,13 @@
 import os
 import shutil
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 
 import grpc
 
 from bridge.config import BridgeSettings
-from bridge.doctor.judgement import folder_findings, program_findings, settings_findings
+from bridge.doctor.judgement import folder_findings, hours_findings, program_findings, settings_findings
 from bridge.robot.gateway import credentials, remedy
 from bridge.rpc.client import newest_state
 from common.config_finding import checked_settings
@@ -29,6 +30,7 @@ def examine(config_file: Path | None) -> Iterator[Finding]:
         return
     yield from _files(settings)
     yield from settings_findings(settings)
+    yield from hours_findings(settings.uploads, datetime.now(UTC))
     existing = next(each for each in (settings.root, *settings.root.parents) if each.exists())
     free_bytes = shutil.disk_usage(existing).free
     yield from folder_findings(settings, free_bytes, writable=os.access(existing, os.W_OK | os.X_OK))

@@ -1,9 +1,12 @@
 """From facts to findings: what is wrong, why it matters, what to do. Pure."""
 
 from collections.abc import Iterator
+from datetime import datetime
 from typing import Final
 
 from bridge.config import BridgeSettings
+from bridge.uploads import hours
+from bridge.uploads.config import UploadSettings
 from common.findings import Finding, good, note, wrong
 from omniseer.gateway.v1 import cloud_pb2 as pb
 
@@ -39,6 +42,19 @@ def folder_findings(settings: BridgeSettings, free_bytes: int, *, writable: bool
         )
     else:
         yield good("disk.room", f"{root} has room for an outbox of {most // _MIB} MiB")
+
+
+def hours_findings(settings: UploadSettings, now: datetime) -> Iterator[Finding]:
+    """Yields by which clock recordings are uploaded, where that depends on one.
+
+    Args:
+        settings: of uploads.
+        now: the instant, aware of its zone.
+    """
+    if hours.are_doubtful(settings, now):
+        yield note("uploads.hours", hours.in_words(settings, now), hours.DOUBT, hours.REMEDY)
+    elif settings.hours:
+        yield good("uploads.hours", hours.in_words(settings, now))
 
 
 def settings_findings(settings: BridgeSettings) -> Iterator[Finding]:

@@ -2,9 +2,11 @@
 
 from pathlib import Path
 from typing import Annotated, Final, Literal, Self
+from zoneinfo import ZoneInfo
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
+from bridge.uploads.zones import checked_name
 from common.config import Section
 from common.text_form import Form
 from fleet.servers import THIS_MACHINE
@@ -31,7 +33,10 @@ class UploadSettings(Section):
     interfaces: tuple[Annotated[str, _INTERFACE], ...] = Field(default=(), max_length=_MOST)
     """Network interfaces through which the store may be reached, "*" for any characters. Empty: all."""
     hours: tuple[Annotated[str, _HOURS], ...] = Field(default=(), max_length=_MOST)
-    """When, "22:00-06:00" for example, by the local time of the robot's computer. Empty: at all times."""
+    """When, "22:00-06:00" for example, as the clock on the wall shows it. Empty: at all times."""
+    time_zone: Annotated[str, Field(max_length=64), AfterValidator(checked_name)] | None = None
+    """The zone of that clock, by its IANA name, Europe/Berlin for example. None: that of the machine; a
+    container has none, which means UTC."""
     only_while_charging: bool = False
     store_hosts: tuple[Annotated[str, _PLACE], ...] = Field(default=(), max_length=_MOST)
     """HOST or HOST:PORT of the fleet's store, with /BUCKET where others have buckets there. Recordings are
@@ -40,6 +45,11 @@ class UploadSettings(Section):
     """Certificate authority of the store. None: those of the system."""
     insecure_store: bool = False
     """Accepts a store without TLS on this machine, for tests."""
+
+    @property
+    def zone(self) -> ZoneInfo | None:
+        """The zone of the hours; None: that of the machine."""
+        return None if self.time_zone is None else ZoneInfo(self.time_zone)
 
     @property
     def hosts(self) -> tuple[str, ...]:

@@ -2,10 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from datetime import time
+from datetime import datetime
 from fnmatch import fnmatchcase
 from typing import Final
 
+from bridge.uploads import hours
 from bridge.uploads.config import UploadSettings
 
 
@@ -15,12 +16,12 @@ class Conditions:
 
     Attributes:
         interface: Through which the store is reached. Empty: not known, or not needed.
-        local_time: By the clock on the wall where the robot is.
+        now: The instant, aware of its zone, which may be any.
         charging: Whether the main battery is being charged; None if unknown.
     """
 
     interface: str
-    local_time: time
+    now: datetime
     charging: bool | None
 
 
@@ -48,16 +49,7 @@ def _interface(settings: UploadSettings, conditions: Conditions) -> str:
 
 
 def _hours(settings: UploadSettings, conditions: Conditions) -> str:
-    now = f"{conditions.local_time:%H:%M}"
-    if not settings.hours or any(_is_within(hours, now) for hours in settings.hours):
-        return ""
-    return f"it is {now}; uploads are allowed at {', '.join(settings.hours)}"
-
-
-def _is_within(hours: str, now: str) -> bool:
-    """Returns whether "HH:MM" is within "HH:MM-HH:MM", which may last over midnight; the end is not."""
-    begin, _, end = hours.partition("-")
-    return begin <= now < end if begin < end else now >= begin or now < end
+    return "" if hours.are_open(settings, conditions.now) else hours.in_words(settings, conditions.now)
 
 
 def _charging(settings: UploadSettings, conditions: Conditions) -> str:

@@ -20,7 +20,7 @@ import random
 from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from datetime import datetime
+from datetime import UTC, datetime
 from typing import Final
 
 from bridge.jittered_backoff import JitteredBackoff
@@ -344,8 +344,7 @@ class Uploads:
         if not self._settings.store_hosts:
             return "no store is configured: set uploads.store_hosts to HOST:PORT of the fleet's store"
         interface = await self._interface() if self._settings.interfaces else ""
-        now = datetime.now().astimezone().time()
-        return gates.closed(self._settings, Conditions(interface, now, self._charging()))
+        return gates.closed(self._settings, Conditions(interface, datetime.now(UTC), self._charging()))
 
     async def _interface(self) -> str:
         """Returns the interface to the host that is sent to; while none is, an allowed one to any of them."""

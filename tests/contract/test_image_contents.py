@@ -48,6 +48,15 @@ def base_of(stage: str) -> str:
     return stage.split()[1]
 
 
+def test_the_bridges_image_has_the_zones_of_its_settings() -> None:
+    """Named, because a base image need not have them."""
+    by_name = stages((ROOT / "docker/bridge.Dockerfile").read_text())
+    assert base_of(list(by_name.values())[-1]) == "system", "what runs begins with these packages"
+    installed = re.search(r"apt-get install (.*?)(?: \\| &&|$)", by_name["system"], re.MULTILINE)
+    assert installed
+    assert "tzdata" in installed[1].split()
+
+
 def test_stand_ins_are_refused_in_every_image_with_ros_unless_it_is_said_that_no_robot_runs_it() -> None:
     compose = yaml.safe_load((ROOT / "compose.yaml").read_text())
     built_here = [each["build"] for each in compose["services"].values() if "build" in each]

@@ -428,6 +428,17 @@ def test_the_bridge_is_an_ordinary_user_that_can_write_its_outbox_and_its_socket
         assert (found.st_mode & 0o777, found.st_uid, found.st_gid) == (mode, *BRIDGE), path
 
 
+def test_the_image_knows_the_zones_of_hours_and_says_when_none_is_set(connected: Fleet) -> None:
+    check = ("run", "--rm", "--no-deps", "-T", "-e", 'BRIDGE__UPLOADS__HOURS=["22:00-06:00"]')
+    zone = ("-e", "BRIDGE__UPLOADS__TIME_ZONE=Asia/Tokyo")
+    said = connected.deployment.run(*check, *zone, "bridge-config").stderr
+    assert "(Asia/Tokyo); uploads are allowed at 22:00-06:00" in said
+    assert "Set uploads.time_zone" not in said
+    said = connected.deployment.run(*check, "bridge-config").stderr
+    assert "(UTC); uploads are allowed at 22:00-06:00" in said
+    assert "Set uploads.time_zone" in said
+
+
 def test_it_listens_on_no_port(connected: Fleet) -> None:
     pid = connected.deployment.program_pid("bridge")
     for table in ("tcp", "tcp6"):

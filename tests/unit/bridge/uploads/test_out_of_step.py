@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import datetime, tzinfo
 from types import SimpleNamespace
 from typing import Any
 
@@ -39,8 +39,8 @@ class Clock:
 
     hour: int = 21
 
-    def now(self) -> datetime:
-        return datetime(2026, 1, 1, self.hour, 30).astimezone()
+    def now(self, zone: tzinfo) -> datetime:
+        return datetime(2026, 1, 1, self.hour, 30).astimezone(zone)
 
 
 @pytest.fixture
