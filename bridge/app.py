@@ -23,17 +23,18 @@ from bridge.sender import Sender
 from bridge.state_sender import StateSender
 from bridge.uploading import NoUploads, QueuedUploads, Uploading, apply_rule
 from bridge.uploads import hours
+from bridge.uploads.kept_queue import KeptQueue
+from bridge.uploads.uploads import Fleet, Uploads
 from common import bind, heartbeat, rpc
 from common.broadcast import Broadcast
 from common.health import Health
 from common.tasks import first_to_end
 from fleet.connection import FleetAddress, Hub, connect
 from fleet.names import inbox_prefix
+from fleet.receipt_keys import read_public_keys
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
-
-    from bridge.uploads.uploads import Uploads
 
 _log = logging.getLogger(__name__)
 
@@ -112,15 +113,10 @@ def _queue(
     *,
     status: StatusReader,
     changes: Broadcast,
-) -> "Uploads | None":
+) -> Uploads | None:
     """Returns the uploads; None for a robot that has no receivers' keys."""
     if settings.hub.receipts is None:
         return None
-    # Late: a robot that uploads nothing does without the memory of their libraries.
-    from bridge.uploads.kept_queue import KeptQueue  # noqa: PLC0415
-    from bridge.uploads.uploads import Fleet, Uploads  # noqa: PLC0415
-    from fleet.receipt_keys import read_public_keys  # noqa: PLC0415
-
     fleet = Fleet(
         fleet=settings.hub.fleet, robot=settings.hub.robot, keys=read_public_keys(settings.hub.receipts)
     )
