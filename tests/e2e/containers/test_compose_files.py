@@ -117,6 +117,16 @@ def test_the_gateway_hears_its_own_machines_graph_alone(overlay: str) -> None:
     assert environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
 
 
+@pytest.mark.parametrize("overlay", OVERLAYS)
+def test_no_caller_keeps_the_gateways_health_check_out(overlay: str) -> None:
+    """It asks where none of them calls, in a directory that is the gateway's alone."""
+    gateway = config(overlay)["services"]["gateway"]
+    socket = Path(gateway["environment"]["GATEWAY__GRPC__SOCKET"])
+    assert gateway["environment"]["HEALTH_TARGET"] == f"unix:{socket}"
+    (options,) = (each.partition(":")[2] for each in gateway["tmpfs"] if each.startswith(f"{socket.parent}:"))
+    assert {"mode=0700", "uid=10001"} <= set(options.split(","))
+
+
 def test_video_yields_to_the_mission() -> None:
     services = config()["services"]
     assert services["preview"]["cpu_shares"] < 1024
@@ -128,7 +138,6 @@ def test_a_guarded_gateway_reads_credentials_that_it_can_not_change() -> None:
     for name in ("gateway", "gateway-config"):
         environment = services[name]["environment"]
         assert environment["GATEWAY__SECURITY__CREDENTIALS"] == "/var/lib/robot-gateway/credentials"
-        assert environment["HEALTH_TARGET"] == f"unix:{environment['GATEWAY__GRPC__SOCKET']}"
     mounts = {each["target"]: each for each in services["gateway"]["volumes"]}
     assert mounts["/var/lib/robot-gateway/credentials"]["read_only"]
     assert not mounts["/var/lib/robot-gateway/audit"].get("read_only")

@@ -4,6 +4,8 @@ import asyncio
 import os
 import resource
 import socket
+import subprocess
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -29,6 +31,7 @@ from gateway.rpc.connections.accepted_sockets import UNLIMITED, AcceptedSockets
 from gateway.rpc.connections.admission import MAX_PENDING
 from omniseer.gateway.v1.robot_gateway_pb2 import GetSystemStatusRequest, WatchSystemStatusRequest
 from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
+from tests.support.free import free_tcp_port
 from tests.support.guarded_gateway import guarded_gateway, new_robot
 from tests.support.guarded_program import guarded_program
 from tests.support.running_gateway import raw_unary, running_gateway
@@ -155,6 +158,33 @@ async def test_watching_strangers_take_no_place_of_an_operator_and_leave_soon(
         for stream in streams:
             assert await stream.read() is not grpc.aio.EOF
             stream.cancel()
+
+
+async def test_callers_that_take_every_place_without_a_credential_keep_out_no_check_over_the_unix_socket(
+    tmp_path: Path,
+) -> None:
+    """Where none is needed: `security.insecure`, or the loopback."""
+    port, unix = free_tcp_port(), tmp_path / "gateway.sock"
+    grpc_settings = {"port": port, "socket": unix}
+    async with running_gateway(
+        tmp_path / "p.sock", port=port, grpc=grpc_settings, limits={"connections": 1}
+    ) as operator:
+        stub: Any = HealthStub(operator.channel)  # its type has no methods
+        watch = stub.Watch(HealthCheckRequest())
+        assert (await watch.read()).status == HealthCheckResponse.SERVING
+        # In a process of its own, as the container's: in this one it would share the watcher's connection.
+        states = [
+            await asyncio.to_thread(health_said, target) for target in (f"127.0.0.1:{port}", f"unix:{unix}")
+        ]
+        assert states[0].partition(": ")[2].startswith("RESOURCE_EXHAUSTED")
+        assert states[1] == f"unix:{unix}: SERVING"
+        watch.cancel()
+
+
+def health_said(target: str) -> str:
+    """What a container's health check prints."""
+    command = [sys.executable, "-m", "common.healthcheck", target]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False).stdout.strip()
 
 
 def test_connections_do_not_take_the_descriptors_that_a_revocation_needs(tmp_path: Path) -> None:
