@@ -10,6 +10,7 @@ authority:
 """
 
 import re
+import secrets
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -78,30 +79,31 @@ def parse_login(text: str) -> Login:
 def keep_login(name: str, target: str, credentials: Credentials, path: Path | None = None) -> RobotsFile:
     """Writes the credentials, each file readable by its owner only, and the robot's entry that names them.
 
+    Interrupted at any point it leaves the login that was stored before or the new one, whole: each login has
+    files of its own, and those of another one are deleted only when the entry names them no more.
+
     Args:
         name: The robot's name.
         target: HOST:PORT of its gateway.
-        credentials: To be stored; the file of a part that is None is deleted.
+        credentials: To be stored.
         path: Another file than this user's own.
 
     Raises:
         UserError: The name or the address is not allowed, or a file can't be written.
+        OSError: A file of the login before can't be deleted.
     """
     path = path or robots_file_path()
     directory = credentials_directory(path, name)
+    mark = secrets.token_hex(4)
     contents = {
-        "ca_certificate_file": ("ca.pem", credentials.ca_certificate),
-        "client_certificate_file": ("client.pem", credentials.client_certificate),
-        "client_key_file": ("client-key.pem", credentials.client_key),
-        "token_file": ("token", credentials.token.encode() if credentials.token else None),
+        "ca_certificate_file": (f"ca-{mark}.pem", credentials.ca_certificate),
+        "client_certificate_file": (f"client-{mark}.pem", credentials.client_certificate),
+        "client_key_file": (f"client-key-{mark}.pem", credentials.client_key),
+        "token_file": (f"token-{mark}", credentials.token.encode() if credentials.token else None),
     }
     stored = {key: (directory / file, content) for key, (file, content) in contents.items() if content}
     robot = Robot(target=target, **{key: file for key, (file, _) in stored.items()})
-    known = put_robot(name, robot, path=path, contents=dict(stored.values()))
-    for file, content in contents.values():
-        if not content:
-            (directory / file).unlink(missing_ok=True)
-    return known
+    return put_robot(name, robot, path=path, contents=dict(stored.values()))
 
 
 def _not_a_login(why: str) -> UserError:

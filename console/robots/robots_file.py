@@ -4,8 +4,8 @@
 
     [robots.lab2]
     target = "lab2.local:50051"
-    ca_certificate_file = "credentials/lab2/ca.pem"
-    token_file = "credentials/lab2/token"
+    ca_certificate_file = "credentials/lab2/ca-5f3a9c1e.pem"
+    token_file = "credentials/lab2/token-5f3a9c1e"
 
 Paths are relative to the file's own directory; `~` is the home directory.
 """

@@ -14,6 +14,7 @@ from console.robots.robots_file import (
     RobotsFile,
     check_name,
     parse_robots_file,
+    read_robots_file,
     read_text,
     robots_file_path,
 )
@@ -34,11 +35,14 @@ def put_robot(
         name: Its name.
         robot: Its entry; paths in it are absolute.
         path: Another file than this user's own.
-        contents: Of files that the entry names. They are written before it, and only if it can be written:
-            an interruption leaves no entry without its files.
+        contents: Of files that the entry names and none did before, in a directory that robotctl keeps. They
+            are written before it, and only if it can be written; then those are deleted there that no entry
+            names. So the entry decides: an interruption leaves it as it was, with the files that it had, or
+            as it is to be.
 
     Raises:
         UserError: The name or the address is not allowed, or the file is wrong or can't be written.
+        OSError: A file that no entry names can't be deleted.
     """
     import tomlkit  # noqa: PLC0415 - see _edit
 
@@ -116,11 +120,25 @@ def _edit(
         # TOML has more notations than can be edited in place: the result is what was meant, or nothing.
         if not _means(path, edited, wanted):
             raise _not_editable(path)
-        for file, content in contents.items():
-            write_private(file, content)
-        if edited != text:
-            write_private(path, edited.encode())
+        try:
+            for file, content in contents.items():
+                write_private(file, content)
+            if edited != text:
+                write_private(path, edited.encode())
+        finally:
+            # After an interruption these are the new ones. Where it does not happen, the next login does it.
+            for directory in {file.parent for file in contents}:
+                _delete_unnamed(directory, read_robots_file(path))
     return wanted
+
+
+def _delete_unnamed(directory: Path, known: RobotsFile) -> None:
+    """Deletes the files of a directory that no robot's entry names."""
+    files = (getattr(robot, key) for robot in known.robots.values() for key in FILE_KEYS)
+    named = {file.resolve() for file in files if file}
+    for file in directory.glob("*"):
+        if file.is_file() and file.resolve() not in named:
+            file.unlink(missing_ok=True)
 
 
 def _means(path: Path, text: str, wanted: RobotsFile) -> bool:

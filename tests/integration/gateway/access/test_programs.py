@@ -170,7 +170,7 @@ def test_from_nothing_to_a_robot_that_is_switched_and_a_credential_that_is_over(
         wait_until(lambda: "is locked out" in log.read_text(), "who guesses is locked out")
 
     # What everything that has run has written, but for files that are meant to hold a secret.
-    kept = {login, ground / "ben.login", *(ground / "config").rglob("token"), *ground.rglob("*-key.pem")}
+    kept = {login, ground / "ben.login", *(ground / "config").rglob("token-*"), *ground.rglob("*-key.pem")}
     written = [path for path in ground.rglob("*") if path.is_file() and path not in kept]
     credentials_files = ("audit.jsonl", "audit-refused.jsonl", "credentials.json")
     assert {log, *(ground / "credentials" / name for name in credentials_files)} <= set(written)
