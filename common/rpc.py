@@ -49,7 +49,8 @@ are reset by HTTP/2, which a flooding caller may see as UNAVAILABLE."""
 def possible_connections(wanted: int, addresses: int = 1) -> int:
     """Returns how many connections to accept at once: all together at most half of the possible descriptors.
 
-    Each takes some 45 to 100 KiB with TLS besides, whatever it does.
+    Each takes some 45 to 100 KiB with TLS besides, whatever it does. The other half is for files: none has to
+    be kept spare for reading the list of credentials.
 
     Args:
         wanted: at each address.
