@@ -170,6 +170,7 @@ PARTS: Final = (
             "siege.p99",
             "siege.p99_beside",
             "siege.login_ms",
+            "siege.unknown_login_ms",
             "siege.revocation_s",
             "siege.rss_mib",
             "siege.descriptors",

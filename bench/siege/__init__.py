@@ -4,6 +4,8 @@ In turns, the operator is measured alone, beside programs that only take the att
 the same clients. Attackers are programs of their own with the same priority as all others, on one core of
 this machine; on a robot they would run on other machines. They call from other addresses of this machine than
 the operator, in each turn from new ones, and return when cut off. A turn begins with their first connections.
+The operator's own address is 127.0.0.1, which the gateway always trusts; some logins come from addresses that
+it has never heard of.
 Against a deployment: `python -m bench.siege --help`.
 """
 

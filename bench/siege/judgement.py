@@ -79,6 +79,15 @@ def rows(outcome: Outcome, size: Size) -> list[Row]:
             judged="worst",
         ),
         Row(
+            name="siege.unknown_login_ms",
+            what="the same from an address that the gateway has never heard of, attempts that fail included; "
+            f"attackers leave after {size.besieged_s:g} s",
+            unit="ms",
+            values=[max(each.unknown_login_ms) for each in outcome.besieged],
+            bar=None,
+            judged="worst",
+        ),
+        Row(
             name="siege.revocation_s",
             what=f"a credential revoked amid the siege, to the end of its {size.streams} streams",
             unit="s",

@@ -8,7 +8,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import AsyncExitStack, ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ from gateway.rpc.connections.accepted_sockets import UNLIMITED, AcceptedSockets
 from gateway.rpc.connections.admission import MAX_PENDING
 from omniseer.gateway.v1.robot_gateway_pb2 import GetSystemStatusRequest, WatchSystemStatusRequest
 from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
+from tests.support.detour import detour
 from tests.support.free import free_tcp_port
 from tests.support.guarded_gateway import guarded_gateway, new_robot
 from tests.support.guarded_program import guarded_program
@@ -39,6 +41,8 @@ from tests.support.waiting import wait_until
 
 SETTLED_WITHIN_S = 4.5
 """Sooner than gRPC itself gives up a handshake."""
+COMES_THROUGH_WITHIN_S = 60.0
+"""Three attempts of gRPC to connect, each with five of TCP; 3 s after the last stranger none is dropped."""
 NOTHING = b""
 HTTP2 = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes([0, 0, 0, 4, 0, 0, 0, 0, 0])
 """The connection preface and empty settings (RFC 9113 3.4): more is not needed to be a connection."""
@@ -113,7 +117,7 @@ async def test_a_connection_without_a_call_is_closed_after_a_while(
 
 @pytest.mark.parametrize("said", [NOTHING, HALF_A_CLIENT_HELLO], ids=["nothing", "half a hello"])
 async def test_strangers_from_many_addresses_keep_no_operator_out(tmp_path: Path, said: bytes) -> None:
-    """Here with a handshake that none of them finishes."""
+    """Here with a handshake that none of them finishes, and of an address that the gateway always trusts."""
     robot = new_robot(tmp_path)
     _, login = robot.add(Role.VIEWER)
     strangers = [f"127.0.1.{number}" for number in range(1, 31)]
@@ -126,6 +130,27 @@ async def test_strangers_from_many_addresses_keep_no_operator_out(tmp_path: Path
                 )
                 assert status.gateway_name
             await until_at_most(opened, MAX_PENDING)
+
+
+async def test_nor_one_whose_address_the_gateway_has_never_heard_of(tmp_path: Path) -> None:
+    """Attempts to connect from there are dropped by chance; TCP repeats them, each time with better odds."""
+    robot = new_robot(tmp_path)
+    _, login = robot.add(Role.VIEWER)
+    strangers = [f"127.0.2.{number}" for number in range(1, 31)]
+    async with guarded_gateway(robot), AsyncExitStack() as stack:
+        with connections(robot.port, 10, NOTHING, strangers) as opened:
+            # Then the gateway has seen how many they are.
+            await until_at_most(opened, MAX_PENDING)
+            for number in range(1, 6):
+                way = await stack.enter_async_context(detour(f"127.5.0.{number}", robot.port))
+                stub = RobotGatewayStub(replace(robot, port=way).channel())
+                status: Any = await stub.GetSystemStatus(
+                    GetSystemStatusRequest(),
+                    metadata=login.metadata(),
+                    timeout=COMES_THROUGH_WITHIN_S,
+                    wait_for_ready=True,
+                )
+                assert status.gateway_name
 
 
 async def test_watching_strangers_take_no_place_of_an_operator_and_leave_soon(

@@ -6,6 +6,7 @@ import pytest
 
 from bench.siege.ground import own_ground
 from bench.siege.judgement import REVOCATION_S
+from bench.siege.operator import UNKNOWN_LOGIN_WITHIN_S
 from bench.siege.rounds import Outcome, besiege
 from bench.siege.size import SMALL
 from gateway.rpc.connections.admission import MAX_PENDING
@@ -42,6 +43,12 @@ def test_every_call_of_the_operator_is_answered(outcome: Outcome) -> None:
         assert record.failures == []
         assert record.status_ms
     assert outcome.besieged[0].login_ms
+
+
+def test_an_operator_at_an_address_that_the_gateway_has_never_heard_of_gets_in(outcome: Outcome) -> None:
+    """After a while. How long that may be, docs/security.md says; no test can, because chance decides."""
+    assert outcome.besieged[0].unknown_login_ms
+    assert max(outcome.besieged[0].unknown_login_ms) < UNKNOWN_LOGIN_WITHIN_S * 1000
 
 
 def test_a_revocation_ends_every_stream_amid_the_siege(outcome: Outcome) -> None:
