@@ -74,6 +74,46 @@ def test_the_hubs_server_is_listed_with_its_version() -> None:
     assert version.partition("-")[0] == says.strip().rpartition("v")[2]
 
 
+BASES = {"DEBIAN_IMAGE": "debian:bookworm-slim", "ROS_IMAGE": "ros:jazzy-ros-core"}
+
+
+def id_of(image: str) -> str:
+    """Empty where the engine has no such image."""
+    asked = subprocess.run(
+        ["docker", "image", "inspect", "--format={{.Id}}", image],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    return asked.stdout.strip()
+
+
+def digests_of(image: str) -> set[str]:
+    """By which the engine knows it in its own repository; none of one that was made here."""
+    if not id_of(image):
+        return set()
+    repository = image.partition(":")[0]
+    known = json.loads(docker("image", "inspect", "--format={{json .RepoDigests}}", image)) or []
+    return {each.partition("@")[2] for each in known if each.startswith(f"{repository}@")}
+
+
+def test_a_base_image_is_named_by_a_digest_that_is_the_same_image() -> None:
+    """Where tests run it was often made by docker/base-image.sh: then no registry knows it, which is said."""
+    printed = scripts_images("digests")
+    lines = dict(line.split("=", 1) for line in printed.stdout.splitlines())
+    known = {variable: digests_of(image) for variable, image in BASES.items()}
+    assert lines.keys() == {variable for variable, digests in known.items() if digests}
+    for variable, image in BASES.items():
+        if variable in lines:
+            name, _, digest = lines[variable].partition("@")
+            assert (name, digest in known[variable]) == (image, True)
+            assert id_of(lines[variable]) == id_of(image)
+        else:
+            assert f"docker pull {image}" in printed.stderr
+    assert (printed.returncode == 0) == all(known.values())
+
+
 def build(image: str) -> None:
     """Builds an image on Debian's, which the others share, with a layer and a command of its own."""
     dockerfile = f'FROM debian:bookworm-slim\nRUN echo {image} > /name\nCMD ["cat", "/name"]\n'

@@ -1,4 +1,4 @@
-"""scripts/images without an engine: what it refuses, and what it warns of."""
+"""scripts/images without an engine: what it refuses and warns of, and how it reads an engine's answers."""
 
 import gzip
 import os
@@ -53,3 +53,58 @@ def test_an_engine_that_shows_the_video_to_neighbours_is_named(
     assert loaded.returncode == 0, loaded.stderr
     assert (f"Docker {version} lets other machines" in loaded.stderr) is warned
     assert ("encrypted: true" in loaded.stderr) is warned
+
+
+DEBIAN, ROS = (f"sha256:{digit * 64}" for digit in "ab")
+
+
+def digests(directory: Path, *, engine: str = "true", **known: str) -> subprocess.CompletedProcess[str]:
+    """What scripts/images makes of images of which the engine knows these digests, one a line.
+
+    Args:
+        directory: for the engine's double.
+        engine: what `docker info` does.
+        known: `debian` and `ros`; an image that is not named is not there.
+    """
+    cases = [f"*' {name}:'*) printf '{text}' ;;" for name, text in known.items()]
+    docker = directory / "docker"
+    docker.write_text(
+        f'#!/bin/sh\n[ "$1" != info ] || exec {engine}\n'
+        f'case "$*" in {" ".join(cases)} *) echo "no such image" >&2; exit 1 ;; esac\n'
+    )
+    docker.chmod(0o755)
+    return scripts_images("digests", PATH=f"{directory}:{os.environ['PATH']}")
+
+
+def test_base_images_are_named_with_their_digests(tmp_path: Path) -> None:
+    printed = digests(tmp_path, debian=f"debian@{DEBIAN}\\n", ros=f"ros@{ROS}\\n")
+    assert (printed.returncode, printed.stderr) == (0, "")
+    assert printed.stdout.splitlines() == [
+        f"DEBIAN_IMAGE=debian:bookworm-slim@{DEBIAN}",
+        f"ROS_IMAGE=ros:jazzy-ros-core@{ROS}",
+    ]
+
+
+def test_the_digest_is_that_of_the_images_own_repository(tmp_path: Path) -> None:
+    """By its name the engine finds no other one."""
+    mirrored = f"mirror.test/debian@{ROS}\\ndebian@{DEBIAN}\\n"
+    printed = digests(tmp_path, debian=mirrored, ros=f"mirror.test/ros@{ROS}\\n")
+    assert printed.stdout.splitlines() == [f"DEBIAN_IMAGE=debian:bookworm-slim@{DEBIAN}"]
+    assert printed.returncode == 1
+    assert "docker pull ros:jazzy-ros-core" in printed.stderr
+
+
+@pytest.mark.parametrize("known", [{}, {"debian": ""}], ids=["not there", "made here"])
+def test_an_image_without_a_digest_is_named_with_what_to_type(tmp_path: Path, known: dict[str, str]) -> None:
+    """And the other one is printed all the same."""
+    printed = digests(tmp_path, ros=f"ros@{ROS}\\n", **known)
+    assert printed.stdout.splitlines() == [f"ROS_IMAGE=ros:jazzy-ros-core@{ROS}"]
+    assert printed.returncode == 1
+    assert "docker pull debian:bookworm-slim" in printed.stderr
+
+
+def test_without_an_engine_no_image_is_to_be_pulled(tmp_path: Path) -> None:
+    printed = digests(tmp_path, engine="false")
+    assert (printed.returncode, printed.stdout) == (1, "")
+    assert "docker/engine start" in printed.stderr
+    assert "docker pull" not in printed.stderr
