@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 from typing import Any, Final
 
-import yaml
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from recorder.offered_qos import OfferedQos, as_yaml
 
 FIRST_DEPTH: Final = 256
 """Before the rate is known: a quarter of a second at 1 kHz."""
@@ -14,7 +15,6 @@ _COVERED_S: Final = 2.0
 """A queue holds what comes in this time, in case the thread gets no CPU for so long."""
 MAX_BYTES: Final = 128 * 1024 * 1024
 """Of one topic's queue; two messages fit at any size."""
-_NS_PER_S: Final = 1_000_000_000
 
 
 def profile_of(offers: Sequence[Any], depth: int) -> Any:
@@ -47,29 +47,24 @@ def depth_for(rate_hz: float, mean_bytes: float) -> int:
 
 
 def offered_qos(offers: Sequence[Any]) -> str:
-    """Returns the publishers' profiles as Jazzy's rosbag2 writes them into a channel's metadata."""
-    profiles = [_profile(each.qos_profile) for each in offers]
-    return str(yaml.safe_dump(profiles, sort_keys=False)) if profiles else ""
+    """Returns the publishers' profiles as rosbag2 writes them into a channel's metadata."""
+    return as_yaml([_profile(each.qos_profile) for each in offers])
 
 
-def _profile(qos: Any) -> dict[str, Any]:
-    return {
-        "history": _word(qos.history),
-        "depth": int(qos.depth),
-        "reliability": _word(qos.reliability),
-        "durability": _word(qos.durability),
-        "deadline": _duration(qos.deadline),
-        "lifespan": _duration(qos.lifespan),
-        "liveliness": _word(qos.liveliness),
-        "liveliness_lease_duration": _duration(qos.liveliness_lease_duration),
-        "avoid_ros_namespace_conventions": bool(qos.avoid_ros_namespace_conventions),
-    }
+def _profile(qos: Any) -> OfferedQos:
+    return OfferedQos(
+        history=_word(qos.history),
+        depth=int(qos.depth),
+        reliability=_word(qos.reliability),
+        durability=_word(qos.durability),
+        liveliness=_word(qos.liveliness),
+        deadline_ns=int(qos.deadline.nanoseconds),
+        lifespan_ns=int(qos.lifespan.nanoseconds),
+        liveliness_lease_ns=int(qos.liveliness_lease_duration.nanoseconds),
+        avoid_ros_namespace_conventions=bool(qos.avoid_ros_namespace_conventions),
+    )
 
 
 def _word(policy: Any) -> str:
+    """Returns rmw's word for a policy: rclpy's names are the same ones."""
     return str(policy.name).lower()
-
-
-def _duration(duration: Any) -> dict[str, int]:
-    seconds, nanoseconds = divmod(int(duration.nanoseconds), _NS_PER_S)
-    return {"sec": seconds, "nsec": nanoseconds}

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from common.video_tap import Header, Kind, MalformedRecordError, decode_object
+from recorder.offered_qos import OfferedQos, as_yaml
 from recorder.values import VIDEO_TOPIC, Channel, GapCause, Item, Loss, Note, Sample
 from recorder.video import access_unit, message
 from recorder.video.access_unit import Codec
@@ -21,18 +22,8 @@ _MAX_TEXT: Final = 1000
 _MAX_SKEW_NS: Final = 60 * 1_000_000_000
 """Between capture and reception. More: the two programs do not have the same CLOCK_MONOTONIC."""
 _CLOCK_NOTE_EVERY_NS: Final = 10 * 1_000_000_000
-_QOS: Final = (
-    "- history: 3\n"
-    "  depth: 0\n"
-    "  reliability: 1\n"
-    "  durability: 2\n"
-    "  deadline:\n    sec: 9223372036\n    nsec: 854775807\n"
-    "  lifespan:\n    sec: 9223372036\n    nsec: 854775807\n"
-    "  liveliness: 1\n"
-    "  liveliness_lease_duration:\n    sec: 9223372036\n    nsec: 854775807\n"
-    "  avoid_ros_namespace_conventions: false\n"
-)
-"""What `ros2 bag play` publishes it with: reliable, volatile."""
+_QOS: Final = as_yaml([OfferedQos(reliability="reliable", durability="volatile")])
+"""What `ros2 bag play` publishes it with."""
 
 
 def channel(presets: frozenset[str]) -> Channel:

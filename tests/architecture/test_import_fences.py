@@ -126,7 +126,7 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("recorder/writing/", (*HEAVY, *WIRE, "omniseer", "asyncio", "recorder.intake", "recorder.store")),
         *(
             (f"recorder/{name}.py", (*HEAVY, *WIRE, "omniseer", "asyncio", "time", "recorder"))
-            for name in ("lifecycle", "incidents")
+            for name in ("lifecycle", "incidents", "offered_qos")
         ),
         ("recorder/config.py", (*HEAVY, *WIRE, "asyncio", "recorder")),
         *(
@@ -299,7 +299,7 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
         ("botocore", ("hub/receiver/",)),
         ("aiohttp", ("bridge/uploads/",)),
         ("cryptography", ("common/ca.py",)),
-        ("yaml", ("common/config.py", "recorder/intake/qos.py", "recorder/mcap/rosbag2.py")),
+        ("yaml", ("common/config.py", "recorder/offered_qos.py", "recorder/mcap/rosbag2.py")),
         ("zeroconf", ("gateway/platform/advertiser.py", "console/robots/discovery.py")),
         ("google_crc32c", ("console/client/exporting.py", "common/open_file.py")),
         ("tomlkit", ("console/robots/robots_file_edit.py",)),
