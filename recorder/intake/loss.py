@@ -20,10 +20,17 @@ _MAX_RECENT: Final = 100_000
 
 @dataclass(slots=True)
 class _Sequence:
-    """The messages of one publisher."""
+    """The messages of one publisher.
+
+    Attributes:
+        last: number of the newest.
+        at_ns: its log time.
+        published_ns: its source time; -1 if unknown.
+    """
 
     last: int
     at_ns: int
+    published_ns: int
 
 
 @dataclass(slots=True)
@@ -59,37 +66,46 @@ class LossCounter:
         self._restarts: list[tuple[int, int]] = []
         """Log times of the messages around each: nothing says how many are missing of the former one."""
         self._surplus = 0
-        """Sequences that were forgotten while other publishers stayed: it may have been one of theirs."""
+        """How many of the sequences may be those of publishers that have gone, while others stayed."""
         self._publishers: frozenset[Hashable] = frozenset()
         self._expected = 1
         """How many publishers there are, as far as is known."""
         self._before: list[_Sequence] = []
         """The sequences as they were at the last `collect`, and in `_recent` what has come since."""
-        self._recent: list[tuple[int, int]] = []
+        self._surplus_before = 0
+        self._recent: list[tuple[int, int, int]] = []
 
-    def take(self, number: int, at_ns: int) -> None:
-        """Notes a message; numbers below 1 mean that the middleware does not number messages."""
+    def take(self, number: int, at_ns: int, published_ns: int = -1) -> None:
+        """Notes a message.
+
+        Args:
+            number: of the middleware; below 1 where it does not number messages.
+            at_ns: log time.
+            published_ns: source time, which two messages of one number do not share; below 1 if unknown.
+        """
         if number < 1:
             return
         if len(self._recent) <= _MAX_RECENT:
-            self._recent.append((number, at_ns))
-        self._take(number, at_ns)
+            self._recent.append((number, at_ns, published_ns))
+        self._take(number, at_ns, published_ns)
 
-    def _take(self, number: int, at_ns: int) -> None:
+    def _take(self, number: int, at_ns: int, published_ns: int) -> None:
         below: _Sequence | None = None
         for each in self._sequences:
+            if each.last == number and each.published_ns == published_ns > 0:
+                return  # The same once more: what a transient local publisher keeps for late subscribers.
             if each.last == number - 1:
                 below = each
                 break
             if each.last < number and (below is None or each.last > below.last):
                 below = each
         if below and below.last == number - 1:
-            below.last, below.at_ns = number, at_ns
+            below.last, below.at_ns, below.published_ns = number, at_ns, published_ns
         elif len(self._sequences) < self._expected:
-            self._sequences.append(_Sequence(number, at_ns))
+            self._sequences.append(_Sequence(number, at_ns, published_ns))
         elif below:
             self._missing.append(_Missing(below.last + 1, number - 1, below.at_ns, at_ns))
-            below.last, below.at_ns = number, at_ns
+            below.last, below.at_ns, below.published_ns = number, at_ns, published_ns
             self._bound()
         elif not self._found(number):
             # Lower than all, and not late: a publisher that was started again.
@@ -98,7 +114,7 @@ class LossCounter:
                 self._surplus -= 1  # Or one whose sequence was taken for that of a publisher that has gone.
             elif len(self._restarts) < _MAX_RANGES:
                 self._restarts.append((oldest.at_ns, at_ns))
-            oldest.last, oldest.at_ns = number, at_ns
+            oldest.last, oldest.at_ns, oldest.published_ns = number, at_ns, published_ns
 
     def collect(self, publishers: frozenset[Hashable] | None) -> Lost | None:
         """Returns what has been missing since the last call.
@@ -107,14 +123,15 @@ class LossCounter:
             publishers: identities of those that the graph has now; None if it can't be examined.
         """
         exact = publishers is not None
-        if publishers is not None and publishers != self._publishers:
+        # Without any, those that were known count: the same ones may come back.
+        if publishers and publishers != self._publishers:
             exact = len(self._recent) <= _MAX_RECENT
             if exact:
                 self._go_through_again(publishers | self._publishers)
             self._expect(publishers)
         missing, self._missing = self._missing, []
         restarts, self._restarts = self._restarts, []
-        self._before = [replace(each) for each in self._sequences]
+        self._before, self._surplus_before = [replace(each) for each in self._sequences], self._surplus
         self._recent.clear()
         times = [*((each.began_ns, each.ended_ns) for each in missing), *restarts]
         if not times:
@@ -127,19 +144,23 @@ class LossCounter:
 
     def _go_through_again(self, publishers: frozenset[Hashable]) -> None:
         """Takes what has come since the last `collect` for messages of these publishers."""
-        self._sequences, self._missing, self._restarts = self._before, [], []
+        self._sequences = [replace(each) for each in self._before]
+        self._missing, self._restarts, self._surplus = [], [], self._surplus_before
         self._expected = _bounded(len(publishers))
-        for number, at_ns in self._recent:
-            self._take(number, at_ns)
+        for message in self._recent:
+            self._take(*message)
 
     def _expect(self, publishers: frozenset[Hashable]) -> None:
         """Knows the publishers from now on; forgets the oldest sequences of those that have gone."""
-        stay = bool(publishers & self._publishers)
+        gone = len(self._publishers - publishers)
+        none_stays = bool(self._publishers) and self._publishers.isdisjoint(publishers)
         self._publishers, self._expected = publishers, _bounded(len(publishers))
         surplus = max(0, len(self._sequences) - self._expected)
         self._sequences.sort(key=lambda each: each.at_ns)
-        del self._sequences[:surplus]
-        self._surplus = surplus if stay else 0
+        # Of a publisher that has taken the place of another, nothing is known but what it has sent since.
+        del self._sequences[: max(surplus, len(self._before)) if none_stays else surplus]
+        # Which ones they are is not known: one that was kept may be of a publisher that has gone.
+        self._surplus = 0 if none_stays else max(surplus, min(gone, len(self._sequences)))
 
     def _found(self, number: int) -> bool:
         """Removes a number from the missing ones; returns whether it was one."""

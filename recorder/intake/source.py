@@ -64,7 +64,7 @@ class Source:
             if now.monotonic_s >= self._switch_at_s:
                 self._switch()
         for each in samples:
-            self._loss.take(each.sequence, each.log_time_ns)
+            self._loss.take(each.sequence, each.log_time_ns, each.publish_time_ns)
             self._bytes += len(each.data)
         self._messages += len(samples)
         self._emptied_at_s = now.monotonic_s

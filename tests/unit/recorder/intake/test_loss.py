@@ -49,9 +49,49 @@ def test_a_message_that_comes_late_is_not_lost(counter: LossCounter) -> None:
     assert lost(counter, ONE) == 0
 
 
-def test_a_repeated_number_changes_nothing(counter: LossCounter) -> None:
-    take(counter, [1, 2, 2, 3])
-    assert lost(counter, ONE) == 0
+def test_a_message_that_comes_twice_changes_nothing(counter: LossCounter) -> None:
+    """As the newest of a transient local publisher does, when the subscription is replaced."""
+    for number, published_ns in [(1, 7), (2, 8), (2, 8), (3, 9)]:
+        counter.take(number, number, published_ns)
+    assert counter.collect(ONE) is None
+
+
+@pytest.mark.parametrize("published_ns", [9, -1], ids=["another", "unknown"])
+def test_the_same_number_of_another_message_is_a_restart(counter: LossCounter, published_ns: int) -> None:
+    counter.take(1, 1, 8 if published_ns > 0 else -1)
+    counter.take(1, 2, published_ns)
+    found = counter.collect(ONE)
+    assert found
+    assert found.messages is None
+
+
+def test_a_publisher_that_has_taken_the_place_of_another_is_no_gap(counter: LossCounter) -> None:
+    """The defect: it was one unless its first message came before the graph was examined."""
+    take(counter, [97, 98, 99])
+    assert counter.collect(ONE) is None
+    assert counter.collect(frozenset({"b"})) is None
+    take(counter, [1, 2])
+    assert counter.collect(frozenset({"b"})) is None
+    take(counter, [3, 1])
+    found = counter.collect(frozenset({"b"}))
+    assert found, "this one was started again unnoticed"
+    assert found.messages is None
+
+
+def test_a_publisher_that_is_back_is_no_gap(counter: LossCounter) -> None:
+    take(counter, [97, 98, 99])
+    for publishers in (ONE, frozenset[Hashable](), frozenset({"b"})):
+        assert counter.collect(publishers) is None
+    take(counter, [1, 2])
+    assert counter.collect(frozenset({"b"})) is None
+
+
+def test_a_publisher_that_was_never_heard_is_no_gap_when_the_other_leaves(counter: LossCounter) -> None:
+    take(counter, [97, 98, 99])
+    assert counter.collect(frozenset({"a", "b"})) is None
+    assert counter.collect(frozenset({"b"})) is None
+    take(counter, [1, 2])
+    assert counter.collect(frozenset({"b"})) is None
 
 
 def test_a_restarted_publisher_has_lost_nothing(counter: LossCounter) -> None:
