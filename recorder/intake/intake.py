@@ -7,6 +7,7 @@
 | it has two types at a time | the first is recorded; a problem. A DDS participant knows one type of a topic |
 | its publishers go | the subscription stays for half a minute, for those that come back |
 | publishers with another QoS join | a second subscription that fits all, then the end of the first |
+| all of them have become transient local | another channel, with whose messages later segments begin |
 | the type is not installed | the topic is left out; a problem that names the package |
 | a name that is no ROS name, more than 1000 topics | left out |
 | a name that is not UTF-8 | the topics of the other nodes go on; losses are unknown meanwhile |
@@ -174,6 +175,7 @@ class Intake:
             if offers or offers is None:
                 entry.published_at_s = now.monotonic_s
             loss = entry.source.update(offers, now)
+            self._channels[key] = entry.source.channel
         except TypeMissingError as error:
             self._found[topic] = str(error)
         except Exception as error:  # noqa: BLE001  # the other topics are recorded all the same

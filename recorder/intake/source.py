@@ -7,7 +7,7 @@ from typing import Any, Final
 from common.receive_time import Instant, received_at
 from common.ros_node import subscribe_raw
 from recorder.intake.loss import LossCounter
-from recorder.intake.qos import FIRST_DEPTH, MAX_BYTES, depth_for, profile_of
+from recorder.intake.qos import FIRST_DEPTH, MAX_BYTES, depth_for, is_latched, offered_qos, profile_of
 from recorder.values import Channel, GapCause, Loss, Sample
 
 OVERLAP_S: Final = 1.0
@@ -32,6 +32,9 @@ class Source:
         channel: what the messages belong to.
         offers: endpoints of its publishers.
         now: the present instant: no message is older, unless it was latched.
+
+    Attributes:
+        channel: what the messages belong to now: another one once all publishers are transient local.
 
     Raises:
         TypeMissingError: the type support can't be loaded.
@@ -125,6 +128,9 @@ class Source:
             self._next = subscribe_raw(self._node, self._message_type, self.channel.topic, profile)
             self._profile, self._depth = profile, depth
             self._switch_at_s = now.monotonic_s + OVERLAP_S
+            if offers and is_latched(offers) and not self.channel.latched:
+                # Before its history comes, which later segments are to begin with.
+                self.channel = replace(self.channel, latched=True, offered_qos=offered_qos(offers))
 
     def _switch(self) -> None:
         self._node.destroy_subscription(self._subscription)

@@ -123,6 +123,77 @@ def test_a_latched_topic_that_is_no_longer_taken_has_ended(talker: Talker, taken
     assert ended.channel is taken.samples("/robot_description")[0].channel
 
 
+def kept_for_later_segments(taken: Taken) -> list[bytes]:
+    """What each later segment of a recording begins with."""
+    cache = LatchedCache()
+    for each in list(taken.items):
+        if isinstance(each, Sample) and each.channel.latched:
+            cache.take(each)
+    return [each.data for each in cache.samples()]
+
+
+def caught_up(taken: Taken) -> None:
+    """Returns when all losses so far are reported."""
+    ticket = taken.intake.catch_up()
+    wait_until(lambda: taken.intake.caught_up >= ticket, "the intake has caught up")
+
+
+@pytest.mark.parametrize("seen", [True, False], ids=["taken before", "sent before"])
+def test_a_map_is_in_later_segments_once_no_volatile_publisher_is_beside_it(
+    talker: Talker, taken: Taken, seen: bool
+) -> None:
+    """The defect: the topic counted for ever as what it was when it was examined first."""
+    latched = QoSProfile(durability=DurabilityPolicy.TRANSIENT_LOCAL, depth=1)
+    with talking("editor") as editor:
+        volatile = editor.publisher("/map", String)
+        subscribed(volatile)
+        for _ in range(3):
+            volatile.publish(String(data="edited"))
+        wait_until(lambda: len(taken.samples("/map")) == 3, "the volatile messages")
+        publisher = talker.node.create_publisher(String, "/map", latched)
+        if not seen:
+            publisher.publish(String(data="stays"))
+        subscribed(publisher)
+        if seen:
+            publisher.publish(String(data="stays"))
+            wait_until(lambda: len(taken.samples("/map")) == 4, "the map, as it is sent")
+        caught_up(taken)
+        assert not any(each.latched for each in taken.channels("/map"))
+    wait_until(lambda: kept_for_later_segments(taken), "the map, as late subscribers get it")
+    (kept,) = kept_for_later_segments(taken)
+    assert b"stays" in kept
+    first, second = taken.channels("/map")
+    assert (first.topic, first.type, first.schema) == (second.topic, second.type, second.schema)
+    assert "transient_local" in second.offered_qos
+    caught_up(taken)
+    assert not [each for each in taken.items if isinstance(each, Loss)], "what comes again was not lost"
+
+
+def test_a_map_whose_publishers_could_not_be_examined_at_first_is_in_later_segments(
+    talker: Talker, taken: Taken, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As while a peer has a name that is not UTF-8."""
+    node = taken.intake._node  # its graph is what can't be examined
+    with monkeypatch.context() as patch:
+
+        def unreadable(_topic: str) -> Any:
+            raise UnicodeDecodeError("utf-8", b"\xff", 0, 1, "invalid start byte")
+
+        patch.setattr(node, "get_publishers_info_by_topic", unreadable)
+        latched = QoSProfile(durability=DurabilityPolicy.TRANSIENT_LOCAL, depth=1)
+        publisher = talker.node.create_publisher(String, "/map", latched)
+        publisher.publish(String(data="before"))
+        subscribed(publisher)
+        assert not taken.samples("/map"), "a volatile subscription gets nothing of the past"
+    wait_until(lambda: kept_for_later_segments(taken), "the map, as late subscribers get it")
+    publisher.publish(String(data="after"))
+    wait_until(lambda: b"after" in taken.samples("/map")[-1].data, "the next map")
+    (kept,) = kept_for_later_segments(taken)
+    assert b"after" in kept
+    caught_up(taken)
+    assert not [each for each in taken.items if isinstance(each, Loss)]
+
+
 def test_qos_follows_publishers_that_join_later(talker: Talker, taken: Taken) -> None:
     """A reliable subscription would never hear the best-effort publisher."""
     reliable = talker.publisher("/chatter", String)
