@@ -7,7 +7,8 @@
 | a chunk whose CRC does not hold, or other damage, with whole chunks behind it | hidden from readers; a gap |
 | message indexes missing or damaged | written anew from the chunk |
 | magic number or header damaged | written anew |
-| a channel whose definition was in a damaged chunk | its messages stay, under a made-up topic |
+| a channel whose definition was in a damaged chunk | its messages stay, under a made-up topic and type |
+| a type whose definition was in one | its messages stay, with a made-up type |
 | no whole chunk | nothing is changed |
 
 Repeating an interrupted recovery has the same result.
@@ -19,7 +20,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO, Final
 
-from mcap.records import Channel, Metadata
+from mcap.records import Channel, Metadata, Schema
 
 from recorder.mcap.records import CDR, OFFERED_QOS, UNNUMBERED, bytes_of, gap_of_note, note_of_gap
 from recorder.mcap.scan import RECORD, Contents, NoteRecord, new_head, scan
@@ -31,6 +32,10 @@ PRIVATE: Final = 0x80
 """MCAP leaves opcodes from 0x80 on to applications, and readers skip them: this hides damaged parts."""
 UNKNOWN_TOPIC: Final = "/unknown/channel_{}"
 """Topic of messages whose channel's definition is lost."""
+UNKNOWN_TYPE: Final = "unknown/msg/Unknown"
+"""Type of messages whose schema's definition is lost. `ros2 bag play` leaves out what is not installed."""
+_SCHEMA_IDS: Final = range(1, 1 << 16)
+"""Those of MCAP; 0 is "none", for which rosbag2 refuses the whole file."""
 
 
 def recover(part: Path) -> SegmentSummary | None:
@@ -47,7 +52,7 @@ def recover(part: Path) -> SegmentSummary | None:
         found = scan(file, part.stat().st_size)
         if not found.chunks:
             return None
-        repairs = [*found.indexes, *_hidden(found.damages, _unknown_channels(found))]
+        repairs = [*found.indexes, *_hidden(found.damages, _unknown_definitions(found))]
         gaps = _write(file, found, repairs)
         file.seek(0)
         digest = hashlib.file_digest(file, "sha256").hexdigest()
@@ -78,15 +83,20 @@ def is_untouched(part: Path) -> bool:
         return scan(file, size).end == size
 
 
-def _unknown_channels(found: Contents) -> bytes:
-    """Makes up the channels whose definitions are lost; returns their records."""
-    unknown = {
-        # Schema 0 is MCAP's for "none".
-        number: Channel(number, UNKNOWN_TOPIC.format(number), CDR, {}, 0)
-        for number in found.counts.keys() - found.channels.keys()
-    }
-    found.channels.update(unknown)
-    return bytes_of(unknown.values())
+def _unknown_definitions(found: Contents) -> bytes:
+    """Makes up the schemas and channels whose definitions are lost; returns their records."""
+    lost = sorted(found.counts.keys() - found.channels.keys())
+    unnamed = {each.schema_id for each in found.channels.values()} - found.schemas.keys() - {0}
+    if lost:
+        taken = found.schemas.keys() | unnamed
+        free = next((each for each in _SCHEMA_IDS if each not in taken), 0)
+        for each in lost:
+            found.channels[each] = Channel(each, UNKNOWN_TOPIC.format(each), CDR, {}, free)
+        unnamed |= {free} - {0}
+    # MCAP, "Schema": an unknown definition has an empty encoding and no data.
+    schemas = {each: Schema(each, b"", "", UNKNOWN_TYPE) for each in sorted(unnamed)}
+    found.schemas.update(schemas)
+    return bytes_of([*schemas.values(), *(found.channels[each] for each in lost)])
 
 
 def _hidden(damages: Sequence[tuple[int, int]], definitions: bytes) -> Iterator[tuple[int, bytes]]:

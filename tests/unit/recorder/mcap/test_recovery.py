@@ -1,5 +1,6 @@
 """What is left of a segment after a power failure or a bad block, as independent readers see it."""
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -25,6 +26,7 @@ from tests.support.segments import (
 CHUNKS = (2, 3, 4)
 VIDEO = replace(STRING, topic=VIDEO_TOPIC)
 FIRST_NS = 1_000_000_000
+TYPE = re.compile(r"[a-z][a-z0-9_]*/msg/[A-Z][A-Za-z0-9]*")
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +68,19 @@ def assert_readable(summary: SegmentSummary) -> list[int]:
     assert summary.messages == len(times) == sum(each.messages for each in summary.channels)
     assert (summary.first_ns, summary.last_ns) == (times[0], times[-1])
     assert summary.size == summary.path.stat().st_size
+    assert_rosbag2_opens(summary.path)
     return times
+
+
+def assert_rosbag2_opens(path: Path) -> None:
+    """As read_metadata() of its mcap_storage.cpp: one channel without a schema costs it the whole file."""
+    with path.open("rb") as file:
+        index = make_reader(file).get_summary()
+    assert index
+    for channel in index.channels.values():
+        schema = index.schemas.get(channel.schema_id)
+        assert schema, f"Could not find schema for topic {channel.topic}"
+        assert TYPE.fullmatch(schema.name), "with another name `ros2 bag play` has nothing to look for"
 
 
 def expected(numbers: range) -> list[int]:
@@ -140,7 +154,38 @@ def test_messages_whose_channel_is_unknown_stay(
     summary = recovered(tmp_path, bytes(damaged))
     assert summary
     assert assert_readable(summary) == expected(range(2, 9))
-    assert {each.topic for each in summary.channels} == {"/byte", "/unknown/channel_1"}
+    assert {(each.topic, each.type) for each in summary.channels} == {
+        ("/byte", "std_msgs/msg/Byte"),
+        ("/unknown/channel_1", "unknown/msg/Unknown"),
+    }
+    assert summarise(summary.path) == summary
+    once = summary.path.read_bytes()
+    again = recovered(tmp_path, once)
+    assert again
+    assert again.path.read_bytes() == once
+
+
+def test_messages_whose_type_is_unknown_stay(tmp_path: Path) -> None:
+    """A type is defined once in a file, with the first of its topics."""
+    part = tmp_path / "0.mcap.part"
+    writer = SegmentWriter(part)
+    begin = part.stat().st_size
+    writer.write(string_sample(0))
+    writer.flush()
+    for number in (1, 2):
+        writer.write(string_sample(number, channel=replace(STRING, topic=f"/other_{number}")))
+    writer.flush()
+    writer.abandon()
+    damaged = bytearray(part.read_bytes())
+    damaged[begin + 70] ^= 1
+    summary = recovered(tmp_path, bytes(damaged))
+    assert summary
+    assert assert_readable(summary) == expected(range(1, 3))
+    assert {(each.topic, each.type) for each in summary.channels} == {
+        ("/other_1", "unknown/msg/Unknown"),
+        ("/other_2", "unknown/msg/Unknown"),
+    }
+    assert summarise(summary.path) == summary
 
 
 def test_gaps_written_before_stay_and_repeating_changes_nothing(
@@ -234,6 +279,7 @@ def test_any_damage_leaves_a_readable_file(tmp_path: Path, unfinished: bytes, da
         assert times == sorted(set(times))
         assert set(times) <= set(expected(range(9)))
         assert summary.messages == len(times)
+        assert_rosbag2_opens(summary.path)
 
 
 @given(content=st.binary(max_size=2000))
