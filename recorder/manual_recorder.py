@@ -27,6 +27,8 @@ _log = logging.getLogger(__name__)
 
 _MEASURED_S: Final = 10.0
 """A shorter recording says little about what its preset takes."""
+_MISSING: Final = 0.1
+"""Nor does one whose video is missing for a larger share of its length."""
 _NS_PER_S: Final = 1_000_000_000
 _NS_PER_MS: Final = 1_000_000
 
@@ -128,7 +130,7 @@ class ManualRecorder:
             return
         self.running = None
         self._lifecycle.close_well()
-        self._remember_rate(done)
+        await self._remember_rate(done)
         _log.info("%s has ended: %s, %d bytes", done.id, reason, done.size)
 
     async def fail(self, error: OSError) -> None:
@@ -228,10 +230,22 @@ class ManualRecorder:
             settings.max_s,
         )
 
-    def _remember_rate(self, manifest: Manifest) -> None:
+    async def _remember_rate(self, manifest: Manifest) -> None:
+        """Keeps what the preset takes, on the disk as well: a recording may end without any request."""
         length_s = (manifest.ended_monotonic_ns - manifest.started_monotonic_ns) / _NS_PER_S
-        if length_s >= _MEASURED_S:
-            self._state_file.measure(manifest.preset, int(manifest.size * 60 / length_s))
+        # Without its frames it would pass for a small one of those that have them.
+        with_video = manifest.video_frames > 0
+        if length_s < _MEASURED_S or (with_video and _without_video_s(manifest) > _MISSING * length_s):
+            return
+        rate = int(manifest.size * 60 / length_s)
+        self._state_file.measure(manifest.preset, rate, with_video=with_video)
+        await attempt("what the preset takes is forgotten at the next start", self._state_file.write)
+
+
+def _without_video_s(manifest: Manifest) -> float:
+    """Returns for how long frames are missing."""
+    gaps = (each for each in manifest.all_gaps if each.cause is GapCause.VIDEO)
+    return sum(each.ended_ns - each.began_ns for each in gaps) / _NS_PER_S
 
 
 def _at_end(manifest: Manifest, progress: Progress) -> Manifest:

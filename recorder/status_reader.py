@@ -108,7 +108,7 @@ class StatusReader:
             return False  # It has not been measured yet.
         if (room_s := self.room_s) is not None:
             return room_s < _SHORT_S
-        rate = self.bytes_per_minute.get(self._parts.settings.first_preset, 0) / 60
+        rate = self.bytes_per_minute[self._parts.settings.first_preset] / 60
         return self._whole_room_bytes < max(LEAST_ROOM, rate * _SHORT_S)
 
     @property
@@ -128,8 +128,12 @@ class StatusReader:
 
     @property
     def bytes_per_minute(self) -> dict[str, int]:
-        """What each preset took when it was last recorded."""
-        return dict(self._parts.state_file.bytes_per_minute)
+        """What each preset took when it was last recorded with video, or without, as it is by default."""
+        settings, state_file = self._parts.settings, self._parts.state_file
+        return {
+            each: state_file.bytes_per_minute(each, with_video=settings.records_video(each))
+            for each in settings.presets
+        }
 
     @property
     def snapshots_pending(self) -> int:

@@ -161,6 +161,7 @@ def _unlisted(files: int) -> str:
 
 def status(status_reader: StatusReader, settings: RecorderSettings) -> pb.RecordingStatus:
     """Returns the message of the recorder's state."""
+    rates = status_reader.bytes_per_minute
     message = pb.RecordingStatus(
         state=STATES[status_reader.phase.state],
         bytes_per_s=status_reader.bytes_per_s,
@@ -173,7 +174,7 @@ def status(status_reader: StatusReader, settings: RecorderSettings) -> pb.Record
                 name=name,
                 description=preset.description,
                 with_video=preset.video and settings.video.socket is not None,
-                bytes_per_minute=status_reader.bytes_per_minute.get(name, 0),
+                bytes_per_minute=rates[name],
                 in_ring=name == settings.ring.preset,
             )
             for name, preset in settings.presets.items()

@@ -1,7 +1,6 @@
 """What outlives a restart besides the recordings: answers of the last minutes, and measured rates."""
 
 import logging
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
@@ -32,11 +31,15 @@ class Answer(BaseModel):
 
 class _Content(BaseModel):
     answers: dict[str, Answer] = {}
+    with_video: dict[str, int] = {}
+    without_video: dict[str, int] = {}
+    """Bytes a minute by preset."""
     bytes_per_minute: dict[str, int] = {}
+    """The same of former releases, which mixed both."""
 
 
 class StateFile:
-    """Answers by request ID, and bytes a minute by preset.
+    """Answers by request ID, and bytes a minute by preset, with video and without.
 
     Ages are of the monotonic clock: the calendar may be set at any time.
 
@@ -60,10 +63,10 @@ class StateFile:
         except (OSError, ValidationError) as error:
             _log.warning("%s can't be read, and begins anew: %s", self._path, error)
 
-    @property
-    def bytes_per_minute(self) -> Mapping[str, int]:
-        """What each preset took when it was last recorded."""
-        return self._content.bytes_per_minute
+    def bytes_per_minute(self, preset: str, *, with_video: bool) -> int:
+        """Returns what a preset took when it was last recorded so; 0 if it never was."""
+        former = self._content.bytes_per_minute.get(preset, 0)
+        return self._rates(with_video=with_video).get(preset, former)
 
     def answered(self, method: str, request_id: str, now_s: float) -> Answer | None:
         """Returns the answer to an earlier request with this ID; None if it is new.
@@ -99,9 +102,12 @@ class StateFile:
         age_s = now_s - answer.at_s if answer.boot_id == self._boot_id else now_s
         return age_s < REMEMBERED_S
 
-    def measure(self, preset: str, bytes_per_minute: int) -> None:
+    def measure(self, preset: str, bytes_per_minute: int, *, with_video: bool) -> None:
         """Keeps what a preset takes."""
-        self._content.bytes_per_minute[preset] = bytes_per_minute
+        self._rates(with_video=with_video)[preset] = bytes_per_minute
+
+    def _rates(self, *, with_video: bool) -> dict[str, int]:
+        return self._content.with_video if with_video else self._content.without_video
 
     def write(self) -> None:
         """Writes the file.

@@ -15,14 +15,32 @@ def answer(at_s: float = 1000.0) -> Answer:
 def test_an_answer_is_given_again_for_ten_minutes_after_a_restart_too(tmp_path: Path) -> None:
     before = StateFile(tmp_path)
     before.remember("1", answer())
-    before.measure("driving", 1_000_000)
+    before.measure("driving", 1_000_000, with_video=True)
+    before.measure("driving", 7000, with_video=False)
     before.write()
     after = StateFile(tmp_path)
     after.load()
     assert after.answered("StartRecording", "1", 1000.0 + REMEMBERED_S - 1) == answer()
     assert after.answered("StartRecording", "1", 1000.0 + REMEMBERED_S) is None
     assert after.answered("StartRecording", "2", 1000.0) is None
-    assert after.bytes_per_minute == {"driving": 1_000_000}
+    assert after.bytes_per_minute("driving", with_video=True) == 1_000_000
+    assert after.bytes_per_minute("driving", with_video=False) == 7000
+    assert after.bytes_per_minute("everything", with_video=False) == 0
+
+
+def test_the_file_of_a_former_release_is_read(tmp_path: Path) -> None:
+    """What it had measured stands for both, with video and without, until that is measured."""
+    made = f'"1": {answer().model_dump_json()}'
+    (tmp_path / "state.json").write_text(f'{{"answers": {{{made}}}, "bytes_per_minute": {{"driving": 5}}}}')
+    state = StateFile(tmp_path)
+    state.load()
+    assert state.answered("StartRecording", "1", 1000.0) == answer()
+    state.measure("driving", 7, with_video=True)
+    state.write()
+    state = StateFile(tmp_path)
+    state.load()
+    assert state.bytes_per_minute("driving", with_video=True) == 7
+    assert state.bytes_per_minute("driving", with_video=False) == 5
 
 
 def test_an_id_stands_for_one_method() -> None:

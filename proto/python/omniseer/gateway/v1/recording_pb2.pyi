@@ -511,7 +511,7 @@ class RecordingPreset(_message.Message):
     with_video: _builtins.bool
     """Whether it contains the video unless the caller says otherwise."""
     bytes_per_minute: _builtins.int
-    """Bytes a minute as measured while it was last recorded. 0: not recorded yet."""
+    """Bytes a minute, measured while it was last recorded as with_video says. 0: not recorded so yet."""
     in_ring: _builtins.bool
     """Whether the ring records it, so that snapshots of it can be made."""
     def __init__(
