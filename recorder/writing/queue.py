@@ -10,6 +10,10 @@ from recorder.values import VIDEO_TOPIC, Channel, Ended, GapCause, Item, Loss, N
 
 _OVERHEAD_BYTES: Final = 256
 """Of a message's objects in memory, roughly."""
+MAX_NOTES: Final = 256
+"""Beyond the bound in bytes: changes of the video's stream come by the second, some hundred bytes each."""
+_LEFT_OUT: Final = "notes_left_out"
+"""Key of a note that stands for others as well: how many."""
 
 
 class SampleQueue:
@@ -18,8 +22,9 @@ class SampleQueue:
     When it is full, the new messages are dropped, and one Loss for each of their channels follows as soon
     as the writer has caught up. After a frame of the video those that follow it are dropped as well, up to
     the next one at which a decoder can begin: without it they would be decoded into wrong pictures. Their
-    Loss follows then, so that it is one. Losses of others are merged by channel and cause meanwhile, and of
-    the notes with one name the newest is kept: neither grows without bound.
+    Loss follows then, so that it is one. Losses of others are merged by channel and cause meanwhile. Notes
+    have room of their own; when that is full, too, the newest of each name is kept, and says how many it has
+    replaced.
 
     Args:
         max_bytes: what waits at most.
@@ -33,7 +38,10 @@ class SampleQueue:
         self._items: deque[Item] = deque()
         self._bytes = 0
         self._losses: dict[tuple[Channel | None, GapCause], Loss] = {}
-        self._notes: dict[str, Note] = {}
+        self._beyond = 0
+        """Notes among the items, beyond the bound in bytes."""
+        self._notes: dict[str, tuple[Note, int]] = {}
+        """Beyond that as well: the newest of each name, and how many it has replaced."""
         self._changed = threading.Condition()
         self._woken = False
         self._awaits_key_frame = False
@@ -67,11 +75,12 @@ class SampleQueue:
             self._woken = False
             if so_far:
                 self._end_held()
-            taken = [*self._items, *self._notes.values(), *self._losses.values()]
+            notes = (_standing_for(count, note) for note, count in self._notes.values())
+            taken = [*self._items, *notes, *self._losses.values()]
             self._items.clear()
             self._notes.clear()
             self._losses.clear()
-            self._bytes = 0
+            self._bytes = self._beyond = 0
         return taken
 
     def _put(self, item: Item) -> None:
@@ -98,8 +107,12 @@ class SampleQueue:
             self._merge(item)
         elif isinstance(item, Ended):
             self._items.append(item)  # There is at most one for each subscription.
+        elif self._beyond < MAX_NOTES:
+            self._items.append(item)
+            self._beyond += 1
         else:
-            self._notes[item.name] = item
+            _, replaced_by_former = self._notes.get(item.name, (item, -1))
+            self._notes[item.name] = item, replaced_by_former + 1
 
     def _end_held(self) -> None:
         if self._held:
@@ -110,6 +123,11 @@ class SampleQueue:
         key = loss.channel, loss.cause
         before = self._losses.get(key)
         self._losses[key] = merged(before, loss) if before else loss
+
+
+def _standing_for(others: int, note: Note) -> Note:
+    """Returns the note, with the number of those that it has replaced."""
+    return replace(note, values={**note.values, _LEFT_OUT: str(others)}) if others else note
 
 
 def merged(first: Loss, second: Loss) -> Loss:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from recorder.values import VIDEO_TOPIC, Channel, Ended, GapCause, Item, Loss, Note, Sample
-from recorder.writing.queue import SampleQueue
+from recorder.writing.queue import MAX_NOTES, SampleQueue
 
 ODOM, SCAN = (
     Channel(topic, "std_msgs/msg/String", b"", "", "", latched=False, presets=frozenset())
@@ -106,14 +106,39 @@ def test_a_message_larger_than_the_queue_passes_alone() -> None:
     assert taken[1] == Loss(ODOM, GapCause.QUEUE, 7, 7, 1)
 
 
-def test_losses_and_notes_of_a_full_queue_are_merged() -> None:
+def test_losses_of_a_full_queue_are_merged() -> None:
     queue = SampleQueue(300)
     queue.put([sample()])
     queue.put([Loss(ODOM, GapCause.MIDDLEWARE, at, at + 1, 2) for at in range(1000)])
-    queue.put([Note("clock", {"n": str(n)}) for n in range(1000)])
-    _, note, loss = queue.take(0)
-    assert note == Note("clock", {"n": "999"})
+    _, loss = queue.take(0)
     assert loss == Loss(ODOM, GapCause.MIDDLEWARE, 0, 1000, 2000)
+
+
+def notes(count: int, name: str = "video_stream") -> list[Note]:
+    return [Note(name, {"bitrate_kbps": str(number)}) for number in range(count)]
+
+
+def test_a_full_queue_keeps_every_change_that_a_note_is_of() -> None:
+    """The defect: all but the newest were replaced, as if the bit rate had changed once."""
+    queue = SampleQueue(300)
+    queue.put([sample(), sample(at_ns=1), *notes(40), sample(at_ns=2), *notes(2, "video_clock")])
+    loss = Loss(ODOM, GapCause.QUEUE, 1, 2, 2)
+    assert queue.take(0) == [sample(), *notes(40), *notes(2, "video_clock"), loss]
+    queue.put([sample(), sample(), *notes(MAX_NOTES)])
+    assert queue.take(0)[1:-1] == notes(MAX_NOTES), "as many as before"
+
+
+def test_notes_of_a_full_queue_are_bounded_and_those_left_out_counted() -> None:
+    queue = SampleQueue(300)
+    queue.put([sample(), *notes(MAX_NOTES), *notes(1000), *notes(1, "video_clock")])
+    taken = queue.take(0)[1:]
+    assert taken[:-2] == notes(MAX_NOTES)
+    assert taken[-2:] == [
+        Note("video_stream", {"bitrate_kbps": "999", "notes_left_out": "999"}),
+        *notes(1, "video_clock"),
+    ]
+    queue.put(notes(1))
+    assert queue.take(0) == notes(1)
 
 
 def test_a_wake_ends_the_wait() -> None:
