@@ -71,12 +71,24 @@ class RecorderProgram(RestartableProgram):
     def decoded(self, made: pb.Recording, topic: str) -> list[Any]:
         """The messages of a recording's topic, by an independent reader of its final files."""
         found = []
+        for reader in self._readers(made):
+            found += [each.decoded_message for each in reader.iter_decoded_messages(topics=[topic])]
+        return found
+
+    def noted(self, made: pb.Recording, name: str) -> list[dict[str, str]]:
+        """The metadata records of that name in a recording's final files, by the same reader."""
+        return [
+            each.metadata
+            for reader in self._readers(made)
+            for each in reader.iter_metadata()
+            if each.name == name
+        ]
+
+    def _readers(self, made: pb.Recording) -> Iterator[Any]:
         for file in made.files:
             if file.name.endswith(".mcap"):
                 with (self.root / "recordings" / made.id / file.name).open("rb") as content:
-                    reader = make_reader(content, decoder_factories=[DecoderFactory()], validate_crcs=True)
-                    found += [each.decoded_message for each in reader.iter_decoded_messages(topics=[topic])]
-        return found
+                    yield make_reader(content, decoder_factories=[DecoderFactory()], validate_crcs=True)
 
     def _serves(self) -> bool:
         self.assert_alive()
