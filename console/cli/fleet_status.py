@@ -14,9 +14,9 @@ from console.cli.tables import STYLES, grid
 from console.client import AsyncGatewayClient, ClientOptions
 from console.client.results import Freshness, SystemStatus
 from console.presentation.formatting import UNKNOWN, bit_rate, quantity
+from console.presentation.health import active_severities, health_style, health_summary
 from console.presentation.json_form import json_form
-from console.presentation.severity_style import HEALTH_STYLES, PREVIEW_STYLES, SeverityStyle
-from console.presentation.status_table import health_summary
+from console.presentation.severity_style import PREVIEW_STYLES, SeverityStyle
 from console.robots import Robot, RobotsFile, read_credentials
 
 
@@ -102,8 +102,9 @@ def _cells(answer: RobotAnswer) -> tuple[Text, ...]:
     health, preview, battery = status.health, status.preview, status.platform.power.lipo_battery
     charge = quantity(battery.charge_percent, "%", 0) if battery.freshness is Freshness.FRESH else UNKNOWN
     rate = f" {bit_rate(preview.measured.bitrate_kbps)}" if preview.measured.available else ""
+    style = health_style(health.state, active_severities(status.faults))
     return (
-        Text(health.state.value.upper(), style=STYLES[HEALTH_STYLES[health.state]]),
+        Text(health.state.value.upper(), style=STYLES[style]),
         Text(charge),
         Text(f"{preview.state.value.upper()}{rate}", style=STYLES[PREVIEW_STYLES[preview.state]]),
         Text(f"{answer.took_ms} ms", style="dim"),

@@ -7,9 +7,9 @@ from console.client.results import DrivePhase, PreviewState, RecorderState
 from console.fleet.columns import STANDING_STYLES, battery_cell, disk_cell, shortened
 from console.fleet.values import FleetRow, RobotState, UploadBrief
 from console.presentation.formatting import UNKNOWN, age, joined, plural, size
+from console.presentation.health import health_style
 from console.presentation.severity_style import (
     FAULT_STYLES,
-    HEALTH_STYLES,
     PREVIEW_STYLES,
     SeverityStyle,
 )
@@ -37,7 +37,8 @@ def detail_rows(row: FleetRow) -> list[Row]:
 
 
 def _of_state(state: RobotState, look: Look) -> Iterator[Row]:
-    yield look.state("health", state.health.value, HEALTH_STYLES[state.health], state.summary)
+    style = health_style(state.health, (fault.severity for fault in state.faults))
+    yield look.state("health", state.health.value, style, state.summary)
     for fault in state.faults:
         text = fault.message or fault.fault_id
         yield look.present("fault", fault.severity.value, FAULT_STYLES[fault.severity], text)

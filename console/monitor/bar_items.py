@@ -3,16 +3,15 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Final
 
-from console.client.results import FaultSeverity, Freshness, Sample
+from console.client.results import Freshness, Sample
 from console.monitor.link import LinkState, LinkText
 from console.monitor.monitor_state import MonitorState
-from console.presentation.formatting import UNKNOWN, joined, plural, quantity
+from console.presentation.formatting import UNKNOWN, joined, quantity
+from console.presentation.health import active_severities, health_counts, health_style, health_summary
 from console.presentation.own_stream import OwnStream
 from console.presentation.picture_age import PictureAge
-from console.presentation.severity_style import HEALTH_STYLES, SeverityStyle
-from console.presentation.status_table import health_summary
+from console.presentation.severity_style import SeverityStyle
 from console.presentation.value_style import (
     BATTERY_FAULTS,
     LOSS_PERCENT,
@@ -24,8 +23,6 @@ from console.presentation.value_style import (
     with_faults,
     worst,
 )
-
-_COUNTED: Final = (FaultSeverity.ERROR, FaultSeverity.WARNING)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,15 +61,8 @@ def health_item(state: MonitorState, now_s: float) -> BarItem:
     summary = health_summary(status)
     if state.outdated(now_s):
         return BarItem("not known", joined(f"last known: {health.state.value.upper()}", summary))
-    severities = [fault.severity for fault in status.faults if fault.active]
-    counts = joined(
-        *(plural(number, severity.value) for severity in _COUNTED if (number := severities.count(severity)))
-    )
-    detail = joined(counts, health.summary)
-    style = HEALTH_STYLES[health.state]
-    if counts and style is SeverityStyle.GOOD:
-        # The health may ignore a fault; a tick beside "1 error" would deny it.
-        style = SeverityStyle.WARNING
+    detail = joined(health_counts(status.faults), health.summary)
+    style = health_style(health.state, active_severities(status.faults))
     return BarItem(health.state.value.upper(), detail, style, summary)
 
 

@@ -12,7 +12,6 @@ from typing import Any, Final, TypeAlias
 from console.client import results
 from console.client.results import (
     CameraState,
-    FaultSeverity,
     PreviewProfile,
     PreviewState,
     SourceState,
@@ -27,6 +26,7 @@ from console.presentation.formatting import (
     quantity,
     sentence,
 )
+from console.presentation.health import active_severities, health_style, health_summary
 from console.presentation.measured_text import (
     attitude_text,
     battery_text,
@@ -43,7 +43,6 @@ from console.presentation.recording import recorder_mark, recording_summary
 from console.presentation.severity_style import (
     CLOUD_STYLES,
     FAULT_STYLES,
-    HEALTH_STYLES,
     PREVIEW_STYLES,
     SeverityStyle,
 )
@@ -127,22 +126,10 @@ def _cameras(preview: results.PreviewStatus, look: Look) -> Iterator[Row]:
             yield look.present("", "camera", style, f"{camera.name}: {wanted}{camera.error}")
 
 
-def health_summary(status: results.SystemStatus) -> str:
-    """Returns the reason of the health, and how many errors and warnings are active."""
-    severities = [fault.severity for fault in status.faults if fault.active]
-    counts = joined(
-        *(
-            plural(number, severity.value)
-            for severity in (FaultSeverity.ERROR, FaultSeverity.WARNING)
-            if (number := severities.count(severity))
-        )
-    )
-    return status.health.summary + (f" ({counts})" if counts else "")
-
-
 def _health(view: View) -> Iterator[Row]:
-    health = view.status.health
-    yield view.state("health", health.state.value, HEALTH_STYLES[health.state], health_summary(view.status))
+    status = view.status
+    style = health_style(status.health.state, active_severities(status.faults))
+    yield view.state("health", status.health.state.value, style, health_summary(status))
 
 
 def _faults(view: View) -> Iterator[Row]:

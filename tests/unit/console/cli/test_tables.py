@@ -183,6 +183,17 @@ def test_health_counts_active_errors_and_warnings() -> None:
     assert (health.label, health.text) == ("health", "robot healthy (2 errors, 1 warning)")
 
 
+@pytest.mark.parametrize("severity", ["WARNING", "ERROR"])
+def test_health_is_not_green_above_a_fault_that_it_ignores(severity: str) -> None:
+    message = healthy_status()
+    assert table_rows(View(decoded(message)))[0].style is SeverityStyle.GOOD
+    fault = message.faults.add(id="preview.failed", severity=f"FAULT_SEVERITY_{severity}", active=True)
+    health = table_rows(View(decoded(message)))[0]
+    assert (health.mark, health.style) == ("OK", SeverityStyle.WARNING)
+    fault.active = False
+    assert table_rows(View(decoded(message)))[0].style is SeverityStyle.GOOD
+
+
 def test_a_title_is_plain_text_of_bounded_length() -> None:
     message = healthy_status()
     message.numbers.add(title="[/red] load", available=True, value=1e300, decimals=4_000_000_000)

@@ -79,6 +79,7 @@ def test_values_of_a_robot_that_is_away_are_stale_and_as_old_as_they_are() -> No
 def test_a_robot_without_values_has_no_rows_of_them() -> None:
     found = rows(healthy_state("a"))
     assert set(found) == {"standing", "health", "battery", "disk", "mode", "software"}
+    assert found["health"].style is SeverityStyle.GOOD
 
 
 def test_all_faults_and_how_many_are_not_listed() -> None:
@@ -87,6 +88,7 @@ def test_all_faults_and_how_many_are_not_listed() -> None:
     message.fault_count = 3
     found = rows(message)
     assert (found["fault"].mark, found["fault"].text) == ("error", "lidar silent")
+    assert (found["health"].mark, found["health"].style) == ("OK", SeverityStyle.WARNING), "not a green OK"
     assert "2 faults that the state does not list" in found
 
 
