@@ -16,6 +16,8 @@ DOCUMENTS = sorted(
     [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "proto").rglob("*.md")],
     key=lambda path: path.relative_to(ROOT),
 )
+INSTALL = ROOT / "scripts/release_program/INSTALL.md"
+"""What a release says about itself."""
 DECISIONS = sorted((ROOT / "docs/decisions").glob("0*.md"))
 
 
@@ -40,6 +42,13 @@ def test_relative_links_lead_somewhere(document: Path) -> None:
 def test_ffplay_is_given_its_latency_in_microseconds(document: Path) -> None:
     latencies = re.findall(r"ffplay.*[?&]latency=(\d+)", document.read_text(encoding="utf-8"))
     assert [each for each in latencies if int(each) < 1000] == []
+
+
+@pytest.mark.parametrize("document", [*DOCUMENTS, INSTALL], ids=lambda path: str(path.relative_to(ROOT)))
+def test_pip_is_that_of_an_environment(document: Path) -> None:
+    """The system's own installs nothing (PEP 668), or is not there beside python3-venv."""
+    lines = document.read_text(encoding="utf-8").splitlines()
+    assert [line for line in lines if re.search(r"(?<![\w./])pip3? install", line)] == []
 
 
 def test_the_contributors_guide_names_files_that_exist() -> None:
