@@ -23,6 +23,11 @@ ADDRESSES = re.compile(r"\b(?:ROBOT:50051|lab1\.local|lab2\.local:50051|10\.0\.0
 ENDLESS = re.compile(r"\brobotctl (?=watch|view --headless --record)")
 """What a reader ends with Ctrl-C."""
 INTERRUPTED = f"{sys.executable} {ROOT}/tests/support/interrupted.py robotctl "
+DONE_ELSEWHERE = re.compile(r"(?<!continuous integration) do(es)?\b")
+"""A reason that says that something else runs the block."""
+PROGRAM = re.compile(
+    r"(?<!\S)(?:[\w.-]*/)*(robotctl|robot-[a-z]+|scripts/[\w-]+)(?!\S)(?: (?!robot-)([a-z][a-z-]*))?"
+)
 ENDS_WITHIN_S = 120
 
 pytestmark = [pytest.mark.gst, pytest.mark.timeout(300)]
@@ -73,8 +78,9 @@ def runnable(page: str) -> list[Block]:
 def test_the_commands_of_a_page_work_in_their_order(robot: VideoGround, tmp_path: Path, page: str) -> None:
     reader = Reader(tmp_path, robot.target)
     (tmp_path / "docker").symlink_to(ROOT / "docker")
-    if page != "docs/robotctl.md":
-        # Where no robot is named, the documents' one is at the default address.
+    if page not in ("README.md", "docs/robotctl.md"):
+        # Where no robot is named, the documents' one is at the default address. Those two add it to the
+        # known robots, which this outranks.
         reader.extra = {"ROBOTCTL_TARGET": robot.target}
     found = runnable(page)
     assert found
@@ -113,8 +119,28 @@ def test_every_block_is_run_or_says_why_not() -> None:
     for page in PAGES:
         for block in blocks(page):
             assert block.reason == "" or len(block.reason) > 10, block.name
-            for test in re.findall(r"tests/[\w/.]+", block.reason):
+            tests = re.findall(r"tests/[\w/.]+", block.reason)
+            for test in tests:
                 assert (ROOT / test).exists(), f"{block.name}: {test}"
+            assert tests or not DONE_ELSEWHERE.search(block.reason), f"{block.name}: which test does?"
+            text = text_of(tests)
+            missing = [word for word in typed(block) if word not in text] if tests else []
+            assert missing == [], f"{block.name}: {tests} do no such thing"
+
+
+def typed(block: Block) -> Iterator[str]:
+    """The project's programs of a block, and their commands as a test types them: in quotes."""
+    for line in block.text.splitlines():
+        for program, command in PROGRAM.findall(line.partition("#")[0]):
+            yield program
+            if command:
+                yield f'"{command}"'
+
+
+def text_of(tests: list[str]) -> str:
+    """The text of files, and of those in folders."""
+    paths = [path for test in tests for path in (ROOT / test, *(ROOT / test).rglob("*.py"))]
+    return "".join(path.read_text(encoding="utf-8") for path in paths if path.is_file())
 
 
 @pytest.mark.parametrize("page", PAGES)
