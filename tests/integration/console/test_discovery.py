@@ -20,6 +20,7 @@ from console.robots.discovery import MOST_CHANGES, MOST_ROBOTS, Discovery
 from tests.support.free import free_tcp_port
 from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.gateway_program import gateway_program
+from tests.support.guarded_program import guarded_program
 from tests.support.robotctl import only_line, robotctl, robotctl_process
 from tests.support.robotctl_docs import documented, holds
 from tests.support.waiting import wait_until
@@ -93,6 +94,21 @@ def test_a_gateway_is_found_from_its_start_to_its_end(tmp_path: Path) -> None:
                 lambda: f"lab 1 ü at {target}" in doctor_of_nowhere(), "the doctor's", ANNOUNCED_WITHIN_S
             )
         wait_until(lambda: target not in targets(discovery), "it has said goodbye", ANNOUNCED_WITHIN_S)
+
+
+def test_a_guarded_gateway_is_found_with_the_login_that_it_needs(tmp_path: Path) -> None:
+    with (
+        Discovery([LOOPBACK]) as discovery,
+        guarded_program(tmp_path, tmp_path, discovery=LOOPBACK_ONLY) as gateway,
+    ):
+        wait_until(lambda: gateway.target in targets(discovery), "it is found", ANNOUNCED_WITHIN_S)
+        (robot,) = [each for each in discovery.robots if each.target == gateway.target]
+        assert robot.tls
+        wait_until(
+            lambda: f"robotctl login lab-1 {gateway.target} FILE" in robotctl("robots", "discover").stdout,
+            "what to type",
+            ANNOUNCED_WITHIN_S,
+        )
 
 
 def test_a_gateway_announces_itself_only_where_that_is_configured(tmp_path: Path) -> None:
