@@ -7,7 +7,7 @@ from datetime import datetime
 from console.client.results import Freshness, Sample
 from console.monitor.link import LinkState, LinkText
 from console.monitor.monitor_state import MonitorState
-from console.presentation.formatting import UNKNOWN, joined, quantity
+from console.presentation.formatting import UNKNOWN, joined, quantity, zone_text
 from console.presentation.health import active_severities, health_counts, health_style, health_summary
 from console.presentation.own_stream import OwnStream
 from console.presentation.picture_age import PictureAge
@@ -140,8 +140,7 @@ def mode_item(state: MonitorState, now_s: float) -> BarItem:
 def clock_item(clock: Callable[[], datetime] = lambda: datetime.now().astimezone()) -> BarItem:
     """Returns this computer's time and its zone."""
     now = clock()
-    offset = f"{now:%z}"
-    return BarItem(f"{now:%H:%M:%S}", f"UTC{offset[:3]}:{offset[3:5]}")
+    return BarItem(f"{now:%H:%M:%S}", zone_text(now))
 
 
 def _is_stale(sample: Sample, state: MonitorState, now_s: float) -> bool:

@@ -51,6 +51,12 @@ def wall_clock(unix_ms: int, zone: tzinfo | None = None, form: str = _CLOCK_FORM
         return UNKNOWN
 
 
+def zone_text(time: datetime) -> str:
+    """Returns the zone of a time by its offset: UTC+01:00."""
+    offset = f"{time:%z}"
+    return f"UTC{offset[:3]}:{offset[3:5]}"
+
+
 def gibibytes(count: int | None) -> str:
     """Returns a size of memory: 1.2 GiB."""
     return quantity(None if count is None else count / _GIB, "GiB")

@@ -91,7 +91,7 @@ class SidePanel(QWidget):
         self.acknowledge.setEnabled(alarm.pending > 0)
         self.sound.setChecked(alarm.sound_on)
         set_text(self.sound, "Sound on" if alarm.sound_on else "Sound off")
-        self.events.show_log(state.events)
+        self.events_tab.show_log(state.events)
 
     def show_tab(self, number: int) -> None:
         """Shows a tab, by its number from 0, and gives it the focus."""

@@ -250,6 +250,24 @@ def test_events_of_impossible_times_are_listed() -> None:
     assert events.lines[1:] == ["--:--:--  gone far"] * 3
 
 
+@pytest.fixture
+def in_japan(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    with monkeypatch.context() as changed:
+        changed.setenv("TZ", "JST-9")
+        time.tzset()
+        yield
+    time.tzset()
+
+
+@pytest.mark.usefixtures("in_japan")
+def test_the_times_of_events_have_their_zone_above_them(desk_work: Desk) -> None:
+    desk_work.window.search_events()
+    zone = desk_work.window.side.events_tab.zone
+    until(lambda: zone.text() == "Times: UTC+09:00", "the zone")
+    assert zone.isVisible()
+    assert zone.fontMetrics().horizontalAdvance(zone.text()) <= zone.contentsRect().width(), "it is elided"
+
+
 def test_a_hundred_faults_do_not_burst_the_window(desk_work: Desk) -> None:
     before = desk_work.window.size()
     for number in range(100):
