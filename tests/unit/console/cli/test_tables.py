@@ -97,6 +97,23 @@ def test_a_faulted_preview_says_why_and_a_fallback_says_what_was_preferred() -> 
     assert "preview faulted (camera unplugged)" in status_line(decoded(message))
 
 
+def test_a_fallback_that_is_a_fault_is_said_once() -> None:
+    message = healthy_status()
+    message.preview.encoder.name, message.preview.encoder.wanted = "x264", "mpp-h265"
+    message.preview.encoder.fallback_reason = "/dev/mpp_service is missing"
+    other = message.faults.add(id="preview.failed", severity=FAULT_SEVERITY_ERROR, active=True)
+    fault = message.faults.add(id="preview.fallback", message="x264 instead of mpp-h265")
+    assert rows_of_the_fallback(message) == ["fallback"], "the fault is cleared, the fallback is not"
+    fault.active, other.active = True, False
+    assert rows_of_the_fallback(message) == ["fault"]
+
+
+def rows_of_the_fallback(message: StatusMessage) -> list[str]:
+    """Where the table says that the preferred encoder does not run."""
+    rows = table_rows(View(decoded(message)))
+    return [row.label or row.mark for row in rows if "mpp-h265" in row.text and row.mark != "cleared"]
+
+
 def test_faults_stand_right_below_health_and_say_what_to_do() -> None:
     message = healthy_status()
     message.faults.add(
