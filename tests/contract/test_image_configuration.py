@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+import yaml
 from typer.testing import CliRunner
 
 from bridge.cli import app as bridge_app
@@ -25,6 +26,19 @@ def test_the_images_name_the_file_once(program: str) -> None:
     assert served
     assert named
     assert named[1] == served[1]
+
+
+def test_the_tap_names_the_file_once() -> None:
+    """It runs in the gateway's image: compose.yaml says what the images of the others do."""
+    services = yaml.safe_load((ROOT / "compose.yaml").read_text(encoding="utf-8"))["services"]
+    for name, command in (("tap", "serve"), ("tap-config", "check")):
+        service = services[name]
+        assert service["image"].startswith("robot-gateway:")
+        file = service["environment"]["ROBOT_TAP_CONFIG"]
+        assert service["command"][-4:] == ["robot-tap", command, "--config", file]
+        assert file in [each["target"] for each in service["volumes"] if isinstance(each, dict)]
+    page = (ROOT / "docs/configuration.md").read_text(encoding="utf-8")
+    assert "The images set them, compose.yaml that of the tap" in page
 
 
 def test_the_variables_name_the_file(tmp_path: Path) -> None:
