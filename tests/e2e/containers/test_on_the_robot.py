@@ -139,6 +139,8 @@ def test_nodes_of_another_user_reach_the_operator_and_the_recorder(
                     "exec", "-T", program, f"robot-{program}", "doctor", "--json", check=False
                 )
                 findings = json.loads(asked.stdout)["findings"]
+                (read,) = [each["what"] for each in findings if each["check"] in ("configuration", "config")]
+                assert read.startswith(f"/etc/robot-gateway/{program}.yaml: "), "not the program's own"
                 assert "ros.transport" in {each["check"] for each in findings}, asked.stdout
                 assert [each for each in findings if each["verdict"] == "wrong"] == [], asked.stderr
 
