@@ -1,5 +1,6 @@
 """Texts of the bar above the picture: health, battery, link, age of the picture, mode, time. Pure."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
@@ -124,7 +125,7 @@ def picture_item(age: PictureAge | None, frozen_s: float | None, stream: OwnStre
     if age is None:
         return BarItem(UNKNOWN, "picture age", tip=joined("the age is not known", delivery))
     found = PICTURE_AGE_MS.judge(age.age_ms)
-    error = "" if age.error_ms is None else f" \u00b1 {age.error_ms:.0f}"
+    error = "" if age.error_ms is None else f" \u00b1 {math.ceil(age.error_ms)}"
     detail = joined(found.word, "picture age")
     return BarItem(f"{age.age_ms:.0f}{error} ms", detail, found.style, joined(age.cause, delivery))
 

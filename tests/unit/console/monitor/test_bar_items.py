@@ -147,7 +147,9 @@ def test_a_lost_link_says_what_is_the_matter() -> None:
     [
         (None, None, "-", SeverityStyle.QUIET),
         (PictureAge(118), None, "118 ms", SeverityStyle.GOOD),
-        (PictureAge(118, 4.2), None, "118 \u00b1 4 ms", SeverityStyle.GOOD),
+        (PictureAge(118, 4.2), None, "118 \u00b1 5 ms", SeverityStyle.GOOD),
+        (PictureAge(118, 0.4), None, "118 \u00b1 1 ms", SeverityStyle.GOOD),
+        (PictureAge(118, 0.0), None, "118 \u00b1 0 ms", SeverityStyle.GOOD),
         (PictureAge(150), None, "150 ms", SeverityStyle.WARNING),
         (PictureAge(400), None, "400 ms", SeverityStyle.BAD),
         (PictureAge(118), 1.9, "> 1.9 s", SeverityStyle.BAD),
