@@ -112,7 +112,7 @@ def link_item(state: MonitorState, link: LinkText, now_s: float, stream: OwnStre
 
 
 def picture_item(age: PictureAge | None, frozen_s: float | None, stream: OwnStream | None = None) -> BarItem:
-    """Returns the age of the picture on the screen.
+    """Returns the age of the picture on the screen, and of a late one where most of it comes from.
 
     Args:
         age: the reading; None without one.
@@ -126,8 +126,10 @@ def picture_item(age: PictureAge | None, frozen_s: float | None, stream: OwnStre
         return BarItem(UNKNOWN, "picture age", tip=joined("the age is not known", delivery))
     found = PICTURE_AGE_MS.judge(age.age_ms)
     error = "" if age.error_ms is None else f" \u00b1 {math.ceil(age.error_ms)}"
-    detail = joined(found.word, "picture age")
-    return BarItem(f"{age.age_ms:.0f}{error} ms", detail, found.style, joined(age.cause, delivery))
+    what = f"picture: {age.cause}" if found.word and age.cause else "picture age"
+    longest = f"longest part: {age.cause}" if age.cause else ""
+    word, detail = f"{age.age_ms:.0f}{error} ms", joined(found.word, what)
+    return BarItem(word, detail, found.style, joined(longest, delivery))
 
 
 def mode_item(state: MonitorState, now_s: float) -> BarItem:

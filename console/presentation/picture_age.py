@@ -12,7 +12,7 @@ class PictureAge:
     Args:
         age_ms: time since the camera took it.
         error_ms: bound of the reading's error; None where it is unknown.
-        cause: where most of a high age comes from; may be empty.
+        cause: the part of the way that takes longest, "link" for example; may be empty.
     """
 
     age_ms: float

@@ -172,7 +172,7 @@ def _age_of(meter: PictureMeter, reported: Callable[[], PictureAge | None]) -> P
     now = meter.reading()
     if now.age_ms is None:
         return reported()
-    return PictureAge(now.age_ms, now.error_ms, f"longest part: {now.cause.value}" if now.cause else "")
+    return PictureAge(now.age_ms, now.error_ms, now.cause.value if now.cause else "")
 
 
 def _stream_of(session: VideoSession) -> OwnStream | None:

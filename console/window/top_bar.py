@@ -53,7 +53,7 @@ class TopBar(QWidget):
         self.health = Cell("Health", ("DEGRADED", "2 errors, 2 warnings"), Marker())
         self.battery = Cell("Battery", ("100 %", "LOW, 12.6 V"), self.battery_gauge)
         self.link = Cell("Link", _WIDEST_LINK, Marker())
-        self.picture = Cell("Picture", ("1000 \u00b1 10 ms", "LATE, picture age"), Marker())
+        self.picture = Cell("Picture", ("1000 \u00b1 10 ms", "LATE, picture: encoder"), Marker())
         self.mode = Cell("Mode", ("autonomous", "last known"), None)
         self.clock = Cell("Time", ("23:59:59", "UTC+00:00"), None)
         self.panel_button = _button("Panel", "Side panel (F9)", checkable=True)

@@ -129,7 +129,7 @@ def test_the_loss_is_that_of_this_windows_stream_where_it_is_known() -> None:
 
 def test_the_tip_of_the_picture_has_cause_and_delivery() -> None:
     stream = OwnStream("direct, round trip 20 ms, rejoined 2x")
-    assert picture_item(PictureAge(180, cause="longest part: link"), None, stream).tip == (
+    assert picture_item(PictureAge(180, cause="link"), None, stream).tip == (
         "longest part: link, direct, round trip 20 ms, rejoined 2x"
     )
     assert picture_item(None, None, stream).tip.startswith("the age is not known, direct")
@@ -160,6 +160,19 @@ def test_the_age_of_the_picture(
 ) -> None:
     item = picture_item(age, frozen_s)
     assert (item.word, item.style) == (word, style)
+
+
+@pytest.mark.parametrize(
+    ("age", "detail"),
+    [
+        (PictureAge(149, cause="link"), "picture age"),
+        (PictureAge(150), "LATE, picture age"),
+        (PictureAge(150, cause="link"), "LATE, picture: link"),
+        (PictureAge(400, cause="encoder"), "LATE, picture: encoder"),
+    ],
+)
+def test_a_late_picture_says_what_takes_longest(age: PictureAge, detail: str) -> None:
+    assert picture_item(age, None).detail == detail
 
 
 def test_the_robots_own_report_is_read() -> None:
