@@ -4,6 +4,7 @@ What moto does not do, the proxy does in its place: moto accepts any signature, 
 checksum and any amount of data. So an expired URL, a full store and damaged bytes are the proxy's.
 """
 
+import asyncio
 import socket
 import subprocess
 import sys
@@ -95,6 +96,9 @@ class FaultyStore:
         received: bytes of parts that have arrived here, by part number, those of cut requests included.
         passed: parts that the store has taken, in order.
         cut_at: closes the connection once so many bytes of parts have arrived in all, once.
+        hold_at: number of a part, and after how many bytes of it no more is read, once; the store never gets
+            that request, and it is never answered.
+        held: set once a request is held.
         answers: status and code of the next requests, in place of the store's; None passes one on.
         early: whether these come before the body is read.
         refused: part of the paths of which no request is passed on; they get 400.
@@ -107,6 +111,8 @@ class FaultyStore:
     received: Counter[int] = field(default_factory=Counter)
     passed: list[int] = field(default_factory=list)
     cut_at: int | None = None
+    hold_at: tuple[int, int] | None = None
+    held: asyncio.Event = field(default_factory=asyncio.Event)
     answers: deque[tuple[int, str] | None] = field(default_factory=deque)
     early: bool = False
     refused: str = ""
@@ -131,7 +137,7 @@ class FaultyStore:
 @asynccontextmanager
 async def faulty_store(server: S3Server) -> AsyncIterator[FaultyStore]:
     """Listens until the block ends."""
-    state = FaultyStore(free_tcp_port())
+    state, over = FaultyStore(free_tcp_port()), asyncio.Event()
     async with aiohttp.ClientSession(auto_decompress=False) as session:
 
         async def handle(request: web.Request) -> web.StreamResponse:
@@ -149,6 +155,11 @@ async def faulty_store(server: S3Server) -> AsyncIterator[FaultyStore]:
                     if state.cut_at is not None and state.total >= state.cut_at and request.transport:
                         state.cut_at = None
                         request.transport.abort()
+                    if state.hold_at and number == state.hold_at[0] and len(body) >= state.hold_at[1]:
+                        state.hold_at = None
+                        state.held.set()
+                        await over.wait()
+                        return web.Response(status=503)
             if len(body) < (request.content_length or 0):
                 return web.Response(status=400)
             if answer:
@@ -185,6 +196,7 @@ async def faulty_store(server: S3Server) -> AsyncIterator[FaultyStore]:
             await web.TCPSite(runner, "127.0.0.1", state.port).start()
             yield state
         finally:
+            over.set()
             await runner.cleanup()
 
 

@@ -1,4 +1,7 @@
-"""Programs that are killed: the robot's goes on in another process, and another receiver takes over."""
+"""Uploads that are killed: another process goes on, and another receiver takes over.
+
+test_killed_bridge.py and test_killed_receivers.py kill the programs themselves.
+"""
 
 import asyncio
 from concurrent.futures import ThreadPoolExecutor
@@ -34,9 +37,7 @@ SIZE = 3 * PART + 12_345
 
 
 @pytest.mark.parametrize("seed", range(3))
-async def test_a_killed_bridge_sends_at_most_one_part_twice(
-    ground: Ground, secure: SecureHub, seed: int
-) -> None:
+async def test_a_killed_process_costs_at_most_one_part(ground: Ground, secure: SecureHub, seed: int) -> None:
     setup = Setup(secure.servers.urls, str(secure.path / ROBOT), ground.proxy.host, SIZE)
     at = Random(seed).randrange(PART, SIZE)
     async with running_receiver(ground.receivers[0]):
