@@ -1,4 +1,8 @@
-"""What a killed bridge costs: bytes that are sent twice, over a real hub, receiver and store (moto's)."""
+"""What a kill amid an upload costs: bytes that are sent twice, over a real hub, receiver and store (moto's).
+
+What is killed has the bridge's uploads and a gateway of its own, and the next one is asked for the recording
+anew: tests/integration/bridge/uploads/test_killed_bridge.py kills the bridge itself.
+"""
 
 import asyncio
 import random
@@ -21,7 +25,7 @@ _WITHIN_S: Final = 120.0
 
 
 def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
-    """Kills the bridge at a random byte of an upload; another process goes on."""
+    """Kills the process at a random byte of an upload; another one goes on."""
     with secure_hub(workdir / "hub") as hub, s3_server(workdir) as server:
         hub.enroll(ROBOT)
         hub.receiver()
@@ -30,7 +34,8 @@ def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
     return [
         Row(
             name="fleet.upload_resume_mib",
-            what=f"bridge killed at a random byte of {_SIZE // MIB} MiB: bytes that another one sends again",
+            what=f"process with the bridge's uploads killed at a random byte of {_SIZE // MIB} MiB: "
+            "bytes that another one sends again",
             unit="MiB",
             values=twice,
             bar=8,
@@ -56,5 +61,5 @@ async def _sent_twice_mib(hub: SecureHub, server: S3Server, workdir: Path, seed:
             with upload_program(setup) as second:
                 last = await asyncio.to_thread(first_line, second)
         if last != "verified\n":
-            raise RuntimeError("the second bridge did not finish the upload")
+            raise RuntimeError("the second process did not finish the upload")
         return max(0, proxy.total - _SIZE) / MIB
