@@ -9,6 +9,11 @@ import statistics
 import time
 from typing import Final
 
+from tests.support.undisturbed import DisturbedError
+
+MOST: Final = 1.5
+"""By which a figure is divided at most: without a bound, any program would be cheap enough beside others that
+are busy enough."""
 _AT_ONCE: Final = 20
 _ROUND_TRIPS: Final = 500
 _VALUE: Final = {"numbers": [1, 2, 3], "text": "x" * 50}
@@ -28,6 +33,18 @@ class Slowdown:
     def factor(self) -> float:
         """The mean duration by the shortest, at least 1."""
         return statistics.fmean(self._taken_s) / min(self._taken_s)
+
+    def at_full_speed(self, counted: float, promised: float) -> float:
+        """Returns a counted time, or share, as that of a processor which nothing slows down.
+
+        Raises:
+            DisturbedError: divided by MOST it is more than was promised, on a processor slowed down further.
+        """
+        figure = counted / min(self.factor, MOST)
+        if figure > promised and self.factor > MOST:
+            slowed_down = f"by a processor slowed down {self.factor:.2f} times"
+            raise DisturbedError(f"{counted:.4f} was counted, {slowed_down}")
+        return figure
 
 
 def _work_s() -> float:
