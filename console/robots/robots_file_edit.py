@@ -1,5 +1,6 @@
 """Edits of the file of known robots, with its comments and layout kept."""
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import takewhile
@@ -24,6 +25,10 @@ if TYPE_CHECKING:
     from tomlkit import TOMLDocument
 
 NO_FILES: Final[Mapping[Path, bytes]] = {}
+_FILE: Final = r"((ca|client|client-key)(-[0-9a-f]+)?\.pem|token(-[0-9a-f]+)?)"
+"""A name of a file of a login (login.py); those of earlier releases have no mark."""
+_OF_A_LOGIN: Final = re.compile(rf"{_FILE}|\.{_FILE}\.\w+")
+"""The same, or what an interruption left of one (common/private_files.py)."""
 
 
 def put_robot(
@@ -133,11 +138,11 @@ def _edit(
 
 
 def _delete_unnamed(directory: Path, known: RobotsFile) -> None:
-    """Deletes the files of a directory that no robot's entry names."""
+    """Deletes the logins' files of a directory that no robot's entry names; a person's own stay."""
     files = (getattr(robot, key) for robot in known.robots.values() for key in FILE_KEYS)
     named = {file.resolve() for file in files if file}
     for file in directory.glob("*"):
-        if file.is_file() and file.resolve() not in named:
+        if _OF_A_LOGIN.fullmatch(file.name) and file.is_file() and file.resolve() not in named:
             file.unlink(missing_ok=True)
 
 

@@ -54,6 +54,15 @@ def test_another_kind_of_login_leaves_nothing_of_the_one_before(path: Path) -> N
     assert (kinds, len(files_of("lab1", path))) == ({"ca", "token"}, 2)
 
 
+def test_of_an_earlier_release_no_secret_is_left_and_what_a_person_put_there_stays(path: Path) -> None:
+    directory = keep_login("lab1", "a:1", TOKEN, path).path.parent / "credentials/lab1"
+    kept = {directory / "notes.txt", directory / "token.old"}
+    for file in (*kept, *(directory / name for name in ("ca.pem", "client.pem", "client-key.pem", "token"))):
+        file.write_text("of before")
+    keep_login("lab1", "a:1", OTHER_TOKEN, path)
+    assert {file for file in files_of("lab1", path) if file.read_text() == "of before"} == kept
+
+
 class Interrupted:
     """Ends a login at one of its changes of the disk, all of which are renames and deletions.
 
