@@ -47,13 +47,12 @@ class Eye:
 
     Attributes:
         seen: each frame that came.
-        corrupt: frames that were not whole.
         reconnects: how often it had to connect again.
     """
 
     def __init__(self, port: int) -> None:
         self.seen: list[Seen] = []
-        self.corrupt = self.reconnects = 0
+        self.reconnects = 0
         self._address = StreamAddress("127.0.0.1", port, latency_ms=20)
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="eye")
@@ -100,5 +99,4 @@ class Eye:
                 frame = receiver.next_frame(timeout_s=0.2)
             except NoFrameError:
                 continue
-            self.corrupt += frame.corrupt
             self.seen.append(Seen(frame.arrival_s, colour(frame), (frame.pts_ns or 0) / 1e9))

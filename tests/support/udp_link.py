@@ -7,6 +7,7 @@ import socket
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import count
 from types import TracebackType
@@ -101,6 +102,7 @@ class UdpLink:
         impairment: of the link; kept, so that it may be changed.
         seed: of the random losses.
         at: address and port of the link; by default any port at 127.0.0.1.
+        tap: takes each packet of the listener's before the link does anything to it, on the link's thread.
     """
 
     def __init__(
@@ -109,12 +111,14 @@ class UdpLink:
         impairment: Impairment | None = None,
         seed: int = 1,
         at: tuple[str, int] = ("127.0.0.1", 0),
+        tap: Callable[[bytes], None] | None = None,
     ) -> None:
         self.impairment = impairment or Impairment()
         self.bytes_to_callers = 0
         """Of all packets that have arrived at callers so far."""
         self.recent: deque[bytes] = deque(maxlen=_KEPT)
         """The last packets that have arrived at callers."""
+        self._tap = tap
         self._to = ("127.0.0.1", to_port)
         self._towards_listener = Line[_Sent](Direction(self.impairment, seed))
         self._towards_callers = Line[_Sent](Direction(self.impairment, seed + 1))
@@ -175,6 +179,8 @@ class UdpLink:
 
     def _from_listener(self, caller: tuple[str, int]) -> None:
         packet = self._backs[caller].recv(_LONGEST_PACKET)
+        if self._tap:
+            self._tap(packet)
         self._towards_callers.send(packet, (self._front, packet, caller))
 
 

@@ -117,7 +117,7 @@ def test_size_and_rate_change_while_it_is_shown(tap: RunningTap, tmp_path: Path)
         published.hz = 10.0
         preview.wait_for(lambda a: 7 < a.measurement.fps < 13, "the new rate")
         assert preview.running().counters == pb.Counters(starts=1)
-        assert (eye.corrupt, eye.reconnects) == (0, 0)
+        assert eye.reconnects == 0
 
 
 @pytest.mark.parametrize("form", ["jpeg", "png"])

@@ -35,6 +35,7 @@ from console.receiver.frame_queue import FrameQueue
 from console.receiver.libsrt import LibsrtMissingError, LocalSocketError
 from console.receiver.options import CLOSES_WITHIN_S, ReceiverOptions
 from console.receiver.reorder import Delivered, Reorder
+from console.receiver.transport_stream import TransportStream
 from console.receiver.unit_decoder import UnitDecoder
 from tests.support.free import free_udp_port
 from tests.support.promise import keeps
@@ -44,6 +45,7 @@ from tests.support.streams import SrtSender, encode
 from tests.support.udp_link import Impairment, UdpLink
 from tests.support.undisturbed import no_stall, undisturbed
 from tests.support.waiting import wait_until
+from tests.support.whole_pictures import WholePictures, fingerprint
 
 pytestmark = pytest.mark.gst
 
@@ -54,6 +56,8 @@ CLOSING = 7
 """SRTS_CLOSING: that state and those after it."""
 SLOW_FRAME_S = 0.1
 KEY_FRAME_EVERY = 15
+MOVING = "zone-plate kx2=10 ky2=10 kt2=2"
+LOSSY = Impairment(delay_s=0.02, loss=0.02)
 CLOSED_WITHIN_S = 1.0
 OLDEST_S = 1.0
 STEADY_FROM = 30
@@ -68,10 +72,19 @@ NO_FRAME = bytes([0x47, 0x1F, 0xFF, 0x10]) + bytes(184)
 
 @pytest.fixture(scope="module")
 def pieces() -> list[bytes]:
-    """Frames of several packets each, none so large that its PES packet does not say how long it is."""
-    made = encode("h264", FRAMES, kbps=2000, pattern="snow")
+    """Frames of several packets each, none so large that its PES packet does not say how long it is.
+
+    Everything in them moves, so that each shows what is lacking of those before it.
+    """
+    made = encode("h264", FRAMES, kbps=2000, pattern=MOVING)
     assert max(map(len, made)) < 1 << 16
     return made
+
+
+@pytest.fixture(scope="module")
+def whole(pieces: list[bytes]) -> WholePictures:
+    """What a viewer may show of them."""
+    return WholePictures(b"".join(pieces))
 
 
 @pytest.fixture
@@ -118,13 +131,21 @@ def watched(
         return viewer.delivery, frames
 
 
-def assert_every_frame(frames: list[Frame]) -> None:
+def assert_every_frame(frames: list[Frame], whole: WholePictures) -> None:
     """Each frame came once, in order and whole."""
     times_ns = [frame.pts_ns or 0 for frame in frames]
     assert len(times_ns) == FRAMES
     steps = [later - earlier for earlier, later in pairwise(times_ns)]
     assert all(abs(step / 1e9 - FRAME_S) < 0.001 for step in steps)
-    assert not any(frame.corrupt for frame in frames)
+    assert whole.numbers(frames) == list(range(FRAMES))
+
+
+def assert_none_torn(frames: list[Frame], whole: WholePictures) -> None:
+    """Some frames are lacking; those that came are whole and in order."""
+    numbers = [-1 if each is None else each for each in whole.numbers(frames)]
+    assert -1 not in numbers, f"torn frames were shown: {numbers}"
+    assert numbers == sorted(set(numbers))
+    assert 0 < len(numbers) < FRAMES
 
 
 @pytest.mark.parametrize(
@@ -139,7 +160,11 @@ def assert_every_frame(frames: list[Frame]) -> None:
     ids=["loopback", "20 ms, 3 %", "20 ms, 10 %", "out of order, some twice", "that, and 3 %"],
 )
 def test_every_frame_is_delivered(
-    port: int, pieces: list[bytes], impairment: Impairment, monkeypatch: pytest.MonkeyPatch
+    port: int,
+    pieces: list[bytes],
+    whole: WholePictures,
+    impairment: Impairment,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # This machine may be busy for longer than a packet is waited for; the waiting itself has unit tests.
     monkeypatch.setattr(reception, "wait_s", lambda _rtt_ms: 3.0)
@@ -149,7 +174,7 @@ def test_every_frame_is_delivered(
         # In a stall of the link's own thread, its socket overflows.
         with no_stall():
             delivery, frames = watched(port, pieces, impairment, max_age_s=10)
-            assert_every_frame(frames)
+            assert_every_frame(frames, whole)
             assert delivery.kind is DeliveryChoice.DIRECT
             assert (delivery.given_up, delivery.dropped_frames, delivery.rejoins) == (0, 0, 0)
             # What is overtaken is missing at first, too.
@@ -159,19 +184,18 @@ def test_every_frame_is_delivered(
 
 
 def test_it_is_the_order_that_delivers_them(
-    port: int, pieces: list[bytes], monkeypatch: pytest.MonkeyPatch
+    port: int, pieces: list[bytes], whole: WholePictures, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The same without the ordering: packets do come out of their order."""
     monkeypatch.setattr(Reorder, "put", lambda _self, _number, payload, _now_s: [Delivered(0, payload)])
     loss = Impairment(delay_s=0.01, loss=0.05, control_loss=0.05)
     delivery, frames = watched(port, pieces, loss, on_picture_lost=lambda _pts: True)
-    assert len(frames) < FRAMES
     assert delivery.dropped_frames > 0
-    assert not any(frame.corrupt for frame in frames), "even so, none that is torn"
+    assert_none_torn(frames, whole)
 
 
 def test_no_torn_frame_is_shown_where_packets_are_given_up(
-    port: int, pieces: list[bytes], monkeypatch: pytest.MonkeyPatch
+    port: int, pieces: list[bytes], whole: WholePictures, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(reception, "wait_s", lambda _rtt_ms: 0.005)
     lost: list[int | None] = []
@@ -180,12 +204,21 @@ def test_no_torn_frame_is_shown_where_packets_are_given_up(
         lost.append(newest_pts)
         return True
 
-    loss = Impairment(delay_s=0.02, loss=0.02)
-    delivery, frames = watched(port, pieces, loss, on_picture_lost=request)
+    delivery, frames = watched(port, pieces, LOSSY, on_picture_lost=request)
     assert delivery.given_up > 0
     assert any(lost)
-    assert 0 < len(frames) < FRAMES
-    assert not any(frame.corrupt for frame in frames)
+    assert_none_torn(frames, whole)
+
+
+def test_without_the_withholding_torn_frames_are_shown_and_seen_to_be_torn(
+    port: int, pieces: list[bytes], whole: WholePictures, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same link and losses: the withholding keeps them back, and the judge knows a torn frame."""
+    monkeypatch.setattr(reception, "wait_s", lambda _rtt_ms: 0.005)
+    monkeypatch.setattr(TransportStream, "_tear", lambda _self: None)
+    delivery, frames = watched(port, pieces, LOSSY)
+    assert delivery.given_up > 0
+    assert None in whole.numbers(frames)
 
 
 class SlowQueue(FrameQueue):
@@ -204,6 +237,7 @@ class SlowQueue(FrameQueue):
 def test_a_decoder_that_is_too_slow_shows_newer_frames_and_asks_for_nothing(port: int) -> None:
     """At 10 of 30 frames per second; a key frame comes every 15."""
     pieces = encode("h264", 3 * FRAMES, kbps=500, gop=KEY_FRAME_EVERY)
+    whole = WholePictures(b"".join(pieces))
     lost: list[int | None] = []
 
     def request(newest_pts: int | None) -> bool:
@@ -227,7 +261,7 @@ def test_a_decoder_that_is_too_slow_shows_newer_frames_and_asks_for_nothing(port
         assert connection.delivery.dropped_frames > FRAMES
         assert connection.delivery.rejoins == 0
         assert lost == []
-        assert not any(frame.corrupt for frame in slow.frames)
+        assert whole.torn(map(fingerprint, slow.frames)) == 0
         return max(waits_s)
 
     keeps(
@@ -421,7 +455,7 @@ def test_it_stops_while_nothing_comes(port: int, pieces: list[bytes]) -> None:
             viewer.next_frame(0.5)
 
 
-def test_hostile_datagrams_do_no_harm(port: int, pieces: list[bytes]) -> None:
+def test_hostile_datagrams_do_no_harm(port: int, pieces: list[bytes], whole: WholePictures) -> None:
     noise = random.Random(1)
     with SrtSender(port) as sender, UdpLink(port) as link, receiver(link.port, max_age_s=1000) as viewer:
         assert sender.viewer_joined.wait(PATIENCE_S)
@@ -429,7 +463,7 @@ def test_hostile_datagrams_do_no_harm(port: int, pieces: list[bytes]) -> None:
             for _ in range(20):
                 link.inject(noise.randbytes(noise.choice([0, 1, 15, 16, 17, 60, 1316, 1472])))
             sender.send(piece)
-            assert not viewer.next_frame(PATIENCE_S).corrupt
+            assert whole.torn([fingerprint(viewer.next_frame(PATIENCE_S))]) == 0
 
 
 def flipped(packet: bytes, noise: random.Random) -> bytes:
@@ -724,7 +758,9 @@ def restamped(piece: bytes, by_ticks: int) -> bytes:
     return bytes(changed)
 
 
-def test_a_stream_whose_pts_wraps_goes_on_with_true_capture_times(port: int, pieces: list[bytes]) -> None:
+def test_a_stream_whose_pts_wraps_goes_on_with_true_capture_times(
+    port: int, pieces: list[bytes], whole: WholePictures
+) -> None:
     """In the middle of it, with the age bounded as usual: no frame is lost, or taken for an old one."""
     hour_ticks, middle_ticks = 3600 * 90_000, FRAMES // 2 * 3000
     wrapping = [restamped(piece, -hour_ticks - middle_ticks) for piece in pieces]
@@ -735,7 +771,7 @@ def test_a_stream_whose_pts_wraps_goes_on_with_true_capture_times(port: int, pie
         capture = CaptureClock(0, lambda: captured_ns + time.monotonic_ns() - begun_ns)
         with no_stall():
             delivery, frames = watched(port, wrapping, Impairment(), capture=capture, max_age_s=PATIENCE_S)
-            assert_every_frame(frames)
+            assert_every_frame(frames, whole)
             assert (delivery.rejoins, delivery.dropped_frames) == (0, 0)
         times_ns = [frame.capture_ns or 0 for frame in frames]
         expected_ns = [captured_ns + round(number * 1e9 / 30) for number in range(FRAMES)]
@@ -781,6 +817,7 @@ def test_over_a_narrow_link_no_frame_that_comes_is_a_second_old(port: int) -> No
     """
     # The encoder's first frames are several times as large: a link as narrow as that never gets over them.
     pieces = encode("h264", STEADY_FROM + 150, gop=1, kbps=2500, pattern="snow")[STEADY_FROM:]
+    whole = WholePictures(b"".join(pieces))
     first_ns = FIRST_PTS_NS + round(STEADY_FROM * FRAME_S * 1e9)
 
     def worst_age_s() -> float:
@@ -796,7 +833,7 @@ def test_over_a_narrow_link_no_frame_that_comes_is_a_second_old(port: int) -> No
             play(sender, pieces)
             frames = everything(viewer)
             assert viewer.delivery.rejoins > 0
-        assert not any(frame.corrupt for frame in frames)
+        assert whole.torn(map(fingerprint, frames)) == 0
         return max(frame.arrival_s - (begun_ns[0] + (frame.capture_ns or 0)) / 1e9 for frame in frames)
 
     keeps(OLDEST_S, "s old at arrival over a narrow link", worst_age_s)
