@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from common.errors import UserError
 from common.gst import Gst, GstVideo, stop_element
@@ -12,7 +12,22 @@ from console.receiver.frame import Frame
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.options import ReceiverOptions
 
-FrameTimes: TypeAlias = Callable[[int], tuple[int | None, float | None]]
+
+class Origin(NamedTuple):
+    """What is known of a frame apart from its pixels.
+
+    Attributes:
+        capture_ns: as in `Frame`.
+        received_s: as in `Frame`.
+        torn: whether it, or a frame that it depends on, lacks something.
+    """
+
+    capture_ns: int | None = None
+    received_s: float | None = None
+    torn: bool = False
+
+
+Origins: TypeAlias = Callable[[int], Origin]
 CODECS = {"video/x-h264": "h264", "video/x-h265": "h265"}
 """Codec by media type of its stream; GStreamer's parser, software decoder and caps are named after it."""
 _BAD = "gstreamer1.0-plugins-bad"
@@ -66,7 +81,7 @@ class DecodingBranch:
         queue: takes every frame, on a GStreamer thread.
         options: pixel format and decoders.
         source: element that provides whole access units; None to take them from the pad of `attach`.
-        times: returns when a frame was captured and received, for its presentation time.
+        origins: returns the origin of a frame, for its presentation time; called once for each.
 
     Raises:
         UserError: an element is not installed.
@@ -78,10 +93,10 @@ class DecodingBranch:
         queue: FrameQueue,
         options: ReceiverOptions,
         source: Any = None,
-        times: FrameTimes | None = None,
+        origins: Origins | None = None,
     ) -> None:
         self._codec = codec
-        self._times = times or _unknown
+        self._origins = origins or _unknown
         self._queue = queue
         self._decoder = options.decoders.get(codec, f"avdec_{codec}")
         self._caps: Any = None
@@ -137,24 +152,25 @@ class DecodingBranch:
         info = self._layout
         buffer = sample.get_buffer()
         pts_ns = None if buffer.pts == Gst.CLOCK_TIME_NONE else buffer.pts
-        captured_ns, received_s = _unknown(0) if pts_ns is None else self._times(pts_ns)
+        origin = Origin() if pts_ns is None else self._origins(pts_ns)
         return Frame(
             width=info.width,
             height=info.height,
             codec=self._codec,
             pts_ns=pts_ns,
             arrival_s=arrival_s,
-            corrupt=buffer.has_flags(Gst.BufferFlags.CORRUPTED),
+            # Few decoders set the flag: those of FFmpeg do not.
+            corrupt=origin.torn or buffer.has_flags(Gst.BufferFlags.CORRUPTED),
             stride=info.stride[0],
             read=partial(_pixels, buffer),
             decoder=self._decoder,
-            capture_ns=captured_ns,
-            received_s=received_s,
+            capture_ns=origin.capture_ns,
+            received_s=origin.received_s,
         )
 
 
-def _unknown(_pts_ns: int) -> tuple[None, None]:
-    return None, None
+def _unknown(_pts_ns: int) -> Origin:
+    return Origin()
 
 
 def _pixels(buffer: Any) -> bytes:

@@ -26,7 +26,8 @@ class Frame:
         codec: of the stream, "h264" or "h265".
         pts_ns: the sender's presentation time as the demultiplexer gives it; None when it gave none.
         arrival_s: when the decoder delivered it, on `time.monotonic()`.
-        corrupt: whether the decoder concealed parts of it, because packets were lost.
+        corrupt: whether it is torn: packets of it, or of a frame that it depends on, were lost. False with
+            direct delivery, which shows no such frame.
         stride: from one row of the first plane (I420: luma) to the next, in bytes.
         read: copies all its pixels, the first plane first.
         decoder: GStreamer's element that decoded it.

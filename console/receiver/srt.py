@@ -11,13 +11,14 @@ from common.errors import UserError
 from common.gst import GLib, Gst, stop
 from console.name_lookup import resolve
 from console.receiver.address import StreamAddress
-from console.receiver.decoding import CODECS, DecodingBranch, element
+from console.receiver.decoding import CODECS, DecodingBranch, Origin, element
 from console.receiver.delivery import Delivery, DeliveryChoice
 from console.receiver.errors import UndecodableError, ended, from_srt, no_socket, undecodable
 from console.receiver.file_branch import add_file_branch
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.libsrt import REMEDY_TOO_MANY_FILES, DirectImpossibleError, LocalSocketError
 from console.receiver.options import CLOSES_WITHIN_S, ReceiverOptions
+from console.receiver.stream_watch import StreamWatch
 
 _STOP = "stop"
 _BRANCH_GONE = "branch-gone"
@@ -63,6 +64,9 @@ class SrtConnection:
         self._had_data = False
         self._branches: dict[str, DecodingBranch] = {}
         self._removed: deque[DecodingBranch] = deque()
+        self._watch = StreamWatch()
+        self._probes: dict[str, tuple[Any, int]] = {}
+        """Pads of the demultiplexer with their probes, by name."""
         self._handlers = ExitStack()
         """Disconnects the handlers of GStreamer's signals."""
         self._pipeline = Gst.Pipeline.new(None)
@@ -92,8 +96,9 @@ class SrtConnection:
         for branch in (*self._branches.values(), *self._removed):
             branch.detach(self._pipeline)
         self._branches.clear()
-        if self._probe is not None:
-            self._source_pad.remove_probe(self._probe)
+        for pad, probe in (*self._probes.values(), (self._source_pad, self._probe)):
+            pad.remove_probe(probe)
+        self._probes.clear()
         self._handlers.close()
 
     def _build(self) -> None:
@@ -110,7 +115,7 @@ class SrtConnection:
             if value is not None and source.find_property(name):
                 source.set_property(name, value)
         self._source_pad = source.get_static_pad("src")
-        self._probe: int | None = self._source_pad.add_probe(Gst.PadProbeType.BUFFER, self._on_first_data)
+        self._probe: int = self._source_pad.add_probe(Gst.PadProbeType.BUFFER, self._on_data)
         demuxer = element("tsdemux", latency=0)
         for signal, handler in (("pad-added", self._on_pad_added), ("pad-removed", self._on_pad_removed)):
             self._handlers.callback(demuxer.disconnect, demuxer.connect(signal, handler))
@@ -123,10 +128,19 @@ class SrtConnection:
 
     # On GStreamer's thread.
 
-    def _on_first_data(self, _pad: Any, _info: Any) -> Any:
+    def _on_data(self, _pad: Any, info: Any) -> Any:
         self._had_data = True
-        self._probe = None
-        return Gst.PadProbeReturn.REMOVE
+        buffer = info.get_buffer()
+        self._watch.take(buffer.extract_dup(0, buffer.get_size()))
+        return Gst.PadProbeReturn.OK
+
+    def _on_unit(self, _pad: Any, info: Any) -> Any:
+        buffer = info.get_buffer()
+        self._watch.note(buffer.get_size(), buffer.pts)
+        return Gst.PadProbeReturn.OK
+
+    def _origin(self, pts_ns: int) -> Origin:
+        return Origin(torn=self._watch.is_torn(pts_ns))
 
     def _on_pad_added(self, _demuxer: Any, pad: Any) -> None:
         media_type = pad.query_caps(None).get_structure(0).get_name()
@@ -137,14 +151,17 @@ class SrtConnection:
             self._queue.end(undecodable(self._address, media_type))
             return
         try:
-            branch = DecodingBranch(codec, self._queue, self._options)
+            branch = DecodingBranch(codec, self._queue, self._options, origins=self._origin)
         except UserError as error:
             self._queue.end(UndecodableError(error.what, error.remedy, final=True))
             return
+        self._probes[pad.get_name()] = pad, pad.add_probe(Gst.PadProbeType.BUFFER, self._on_unit)
         self._branches[pad.get_name()] = branch
         branch.attach(self._pipeline, pad)
 
     def _on_pad_removed(self, _demuxer: Any, pad: Any) -> None:
+        if found := self._probes.pop(pad.get_name(), None):
+            pad.remove_probe(found[1])
         branch = self._branches.pop(pad.get_name(), None)
         if branch:
             self._removed.append(branch)

@@ -10,7 +10,7 @@ from console.capture_time import ns_to_ticks
 from console.receiver.address import StreamAddress
 from console.receiver.decoder_queue import DecoderQueue
 from console.receiver.decoder_time import DecoderTime
-from console.receiver.decoding import DecodingBranch, element
+from console.receiver.decoding import DecodingBranch, Origin, element
 from console.receiver.errors import UndecodableError, undecodable
 from console.receiver.file_branch import add_file_branch
 from console.receiver.frame_queue import FrameQueue
@@ -125,7 +125,7 @@ class UnitDecoder:
         caps = f"video/x-{codec},stream-format=byte-stream,alignment=au"
         try:
             source = element("appsrc", caps=caps, is_live=True, format="time", max_bytes=0)
-            self._branch = DecodingBranch(codec, self._queue, self._options, source, self._times)
+            self._branch = DecodingBranch(codec, self._queue, self._options, source, self._origin)
         except UserError as error:
             raise UndecodableError(error.what, error.remedy, final=True) from error
         self._codec, self._source = codec, source
@@ -143,8 +143,8 @@ class UnitDecoder:
             # Of a frame that the decoder has dropped.
             self._received_s.pop(next(iter(self._received_s)), None)
 
-    def _times(self, pts_ns: int) -> tuple[int | None, float | None]:
-        """Returns when a frame was captured and received, for its decoder's time. On GStreamer's thread."""
+    def _origin(self, pts_ns: int) -> Origin:
+        """Returns the origin of a frame, for its decoder's time. On GStreamer's thread."""
         capture = self._options.capture
         captured_ns = capture.capture_ns(ns_to_ticks(pts_ns)) if capture else None
-        return captured_ns, self._received_s.pop(pts_ns, None)
+        return Origin(captured_ns, self._received_s.pop(pts_ns, None))

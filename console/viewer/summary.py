@@ -21,7 +21,7 @@ class ViewSummary:
 
     Args:
         pictures: decoded frames.
-        corrupt_pictures: of these, the ones with parts that the decoder concealed.
+        corrupt_pictures: of these, the torn ones: `Frame.corrupt`.
         width_px: of the latest frame; None without one, like the following.
         height_px: of the latest frame.
         codec: of the latest frame.

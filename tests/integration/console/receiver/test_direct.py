@@ -41,7 +41,7 @@ from tests.support.free import free_udp_port
 from tests.support.promise import keeps
 from tests.support.receiver import NoFrameError, Receiver, show_the_first
 from tests.support.stalls import Stalls
-from tests.support.streams import SrtSender, encode
+from tests.support.streams import SRT_PAYLOAD, SrtSender, encode
 from tests.support.udp_link import Impairment, UdpLink
 from tests.support.undisturbed import no_stall, undisturbed
 from tests.support.waiting import wait_until
@@ -704,6 +704,23 @@ def test_srt_delivery_on_request(port: int, pieces: list[bytes]) -> None:
             sender.send(piece)
         assert viewer.next_frame(PATIENCE_S).width == 320
         assert viewer.delivery.kind is DeliveryChoice.SRT
+
+
+def test_srt_delivery_shows_torn_frames_and_says_so_of_each(
+    port: int, pieces: list[bytes], whole: WholePictures
+) -> None:
+    """As players do. A packet of frame 40 is missing, and one of the key frame after it."""
+    sent = list(pieces)
+    for number, first in ((40, 188), (60, 0)):
+        sent[number] = pieces[number][:first] + pieces[number][first + SRT_PAYLOAD :]
+    with SrtSender(port) as sender, receiver(port, delivery=DeliveryChoice.SRT) as viewer:
+        assert sender.viewer_joined.wait(PATIENCE_S)
+        play(sender, sent)
+        frames = everything(viewer)
+    torn = [number is None for number in whole.numbers(frames)]
+    assert [frame.corrupt for frame in frames] == torn
+    assert torn[:40] == [False] * 40
+    assert all(torn[40:])
 
 
 def test_every_frame_carries_its_capture_time(port: int) -> None:
