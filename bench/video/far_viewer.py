@@ -1,7 +1,7 @@
 """A viewer as a program, as `robotctl view --headless` watches: connects again, requests key frames, reports.
 
-Writes what it saw as JSON: `glances`, `[captured_s, decoded_s, corrupt]` of each frame, and the final figures
-of the session.
+Writes what it saw as JSON: `frames`, `[captured_s, decoded_s, fingerprint]` of each frame, the first one null
+where its stamp can't be read, and the final figures of the session.
 """
 
 import argparse
@@ -9,11 +9,11 @@ import json
 import time
 
 from bench.video.viewing import capture_time
-from bench.video.window import Glance
 from console.presentation.json_form import json_form
 from console.receiver.delivery import DeliveryChoice
 from console.receiver.frame import Frame, PixelFormat
 from console.viewer.robot_video import RobotVideo
+from tests.support.whole_pictures import fingerprint
 
 _CLOSE_TIMEOUT_S = 5.0
 
@@ -25,14 +25,13 @@ def main() -> None:
     parser.add_argument("seconds", type=float)
     parser.add_argument("--delivery", type=DeliveryChoice, default=DeliveryChoice.AUTO)
     given = parser.parse_args()
-    seen: list[Glance] = []
+    seen: list[tuple[float | None, float, int]] = []
     robot = RobotVideo(given.target, pixels=PixelFormat.I420, delivery=given.delivery)
 
     def note(frame: Frame) -> None:
         robot.meter.shown(frame)
-        captured_s = capture_time(frame)
-        if captured_s is not None:
-            seen.append(Glance(captured_s, frame.arrival_s, frame.corrupt))
+        pixels = frame.read()
+        seen.append((capture_time(frame, pixels), frame.arrival_s, fingerprint(frame, pixels)))
 
     robot.session.add_frame_listener(note)
     robot.start()
@@ -42,7 +41,7 @@ def main() -> None:
     finally:
         robot.close(_CLOSE_TIMEOUT_S)
     found = {
-        "glances": [(one.captured_s, one.decoded_s, one.corrupt) for one in seen],
+        "frames": seen,
         "redials": robot.session.redials,
         "delivery": json_form(delivery),
     }

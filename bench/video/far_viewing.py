@@ -1,4 +1,8 @@
-"""Watches a robot over a link with the product's own viewer, in a process of its own."""
+"""Watches a robot over a link with the product's own viewer, in a process of its own.
+
+Whether a frame is torn is judged by its pixels: it is, unless a decoder gives the same ones for the stream as
+the robot sent it, taken down before the link loses anything of it.
+"""
 
 import json
 import subprocess
@@ -14,6 +18,7 @@ from bench.video.camera import Camera
 from bench.video.window import Glance, Glass, Window, longest_gap_ms
 from console.client import PreviewProfile
 from console.receiver.delivery import DeliveryChoice
+from tests.support.sent_stream import SentStream
 from tests.support.udp_link import Impairment, UdpLink
 
 START_S: Final = 1.5
@@ -27,7 +32,8 @@ class FarWatch:
     """What a viewer saw over a link.
 
     Args:
-        glances: every frame that it showed, from its start on.
+        glances: every frame with a stamp that it showed, from its start on; the torn ones are corrupt.
+        torn: how many it showed that are torn, with or without a stamp.
         from_s: begin of the window, on `time.monotonic()`.
         until_s: its end.
         captured: frames that the camera took in it.
@@ -39,6 +45,7 @@ class FarWatch:
     """
 
     glances: Sequence[Glance]
+    torn: int
     from_s: float
     until_s: float
     captured: int
@@ -57,11 +64,6 @@ class FarWatch:
     def delivered_percent(self) -> float:
         """Share of the camera's frames in the window that were shown whole."""
         return self.window.delivered_percent(self.captured)
-
-    @property
-    def torn(self) -> int:
-        """Frames that were shown although parts of them were missing."""
-        return sum(one.corrupt for one in self.glances)
 
     @property
     def freeze_ms(self) -> float:
@@ -112,9 +114,10 @@ def watch_far(
     total_s = START_S + settle_s + watch_s + _AFTERWARDS_S
     command = [sys.executable, "-m", "bench.video.far_viewer", robot.client.target, str(total_s)]
     command += ["--delivery", delivery.value]
+    sent = SentStream()
     with (
         robot.preview(profile),
-        robot.link(impairment, seed) as link,
+        robot.link(impairment, seed, sent.take) as link,
         subprocess.Popen(command, stdout=subprocess.PIPE) as viewer,
     ):
         time.sleep(START_S + settle_s)
@@ -126,8 +129,14 @@ def watch_far(
         preview = robot.client.status().preview
         written, _ = viewer.communicate(timeout=total_s + _ENDS_WITHIN_S)
     found = json.loads(written)
+    whole = sent.pictures()
     return FarWatch(
-        [Glance(*one) for one in found["glances"]],
+        [
+            Glance(captured_s, decoded_s, corrupt=shown not in whole)
+            for captured_s, decoded_s, shown in found["frames"]
+            if captured_s is not None
+        ],
+        whole.torn(shown for _, _, shown in found["frames"]),
         from_s,
         until_s,
         source.captured(from_s, until_s),

@@ -3,7 +3,7 @@
 import json
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -83,9 +83,15 @@ class Robot:
         """Connects the product's receiver; by default with SRT's own delivery, as the reference has it."""
         return Receiver(self.address, queue_size=4, options=options)
 
-    def link(self, impairment: Impairment, seed: int) -> UdpLink:
-        """Returns a link with such properties at `FAR_HOST`; the same seed loses the same packets."""
-        return UdpLink(self.address.port, impairment, seed, at=(FAR_HOST, self.address.port))
+    def link(self, impairment: Impairment, seed: int, tap: Callable[[bytes], None] | None = None) -> UdpLink:
+        """Returns a link with such properties at `FAR_HOST`; the same seed loses the same packets.
+
+        Args:
+            impairment: its properties.
+            seed: of the losses.
+            tap: takes what the robot sends; see `UdpLink`.
+        """
+        return UdpLink(self.address.port, impairment, seed, at=(FAR_HOST, self.address.port), tap=tap)
 
     @contextmanager
     def preview(self, profile: PreviewProfile = PreviewProfile.BALANCED) -> Iterator[None]:

@@ -27,10 +27,15 @@ Connect = Callable[[], AbstractContextManager[Viewer]]
 """Connects a viewer; it disconnects when the block ends."""
 
 
-def capture_time(frame: Frame) -> float | None:
-    """Returns when a frame was captured, on `time.monotonic()`; None when its stamp can't be read."""
+def capture_time(frame: Frame, pixels: bytes | None = None) -> float | None:
+    """Returns when a frame was captured, on `time.monotonic()`; None when its stamp can't be read.
+
+    Args:
+        frame: which.
+        pixels: of it, where they were read already.
+    """
     middle = stamp.BLOCK_PX // 2 * frame.stride
-    return stamp.read(frame.read()[middle : middle + frame.stride])
+    return stamp.read((pixels or frame.read())[middle : middle + frame.stride])
 
 
 def watch(viewer: Viewer, seconds: float) -> list[Glance]:

@@ -20,7 +20,7 @@ class Glance:
     Args:
         captured_s: when the camera took it.
         decoded_s: when the decoder delivered it.
-        corrupt: whether the decoder concealed parts of it.
+        corrupt: whether it is torn, as far as the viewer knows, or the judge in far_viewing.py.
         error_ms: how much the age that the viewer itself gives is off; None without one.
     """
 

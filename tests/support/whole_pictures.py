@@ -16,9 +16,14 @@ _ROW_STEP: Final = 8
 _PATIENCE_NS: Final = 30_000_000_000
 
 
-def fingerprint(frame: Frame) -> int:
-    """Returns a number that only frames with the same luma share, of a frame in I420."""
-    return _fingerprint(frame.read(), frame.width, frame.height, frame.stride)
+def fingerprint(frame: Frame, pixels: bytes | None = None) -> int:
+    """Returns a number that only frames with the same luma share, of a frame in I420.
+
+    Args:
+        frame: which.
+        pixels: of it, where they were read already.
+    """
+    return _fingerprint(pixels or frame.read(), frame.width, frame.height, frame.stride)
 
 
 class WholePictures:
@@ -29,13 +34,16 @@ class WholePictures:
     """
 
     def __init__(self, stream: bytes) -> None:
-        self.fingerprints = _decoded(stream)
+        self.fingerprints = _decoded(stream) if stream else []
         """Of its frames, in order."""
         self._numbers = {found: number for number, found in enumerate(self.fingerprints)}
 
+    def __contains__(self, shown: int) -> bool:
+        return shown in self._numbers
+
     def torn(self, shown: Iterable[int]) -> int:
         """Returns how many frames, by their fingerprints, are none of the stream's."""
-        return sum(each not in self._numbers for each in shown)
+        return sum(each not in self for each in shown)
 
     def numbers(self, frames: Sequence[Frame]) -> list[int | None]:
         """Returns the place in the stream of each frame, from 0 on; None of a torn one."""

@@ -120,10 +120,11 @@ def test_a_watch_over_a_narrow_link(source: Camera, tmp_path: Path) -> None:
     # A frame is no younger than the link is long, and a picture is on the screen until the next one comes.
     assert found.glass().worst_ms >= found.glass().p95_ms > 10
     assert found.glass().worst_ms > max(one.latency_ms for one in found.window.glances)
+    assert found.torn == 0
 
 
 def far_watch(*seen: Glance) -> FarWatch:
-    return FarWatch(seen, 1.0, 13.0, 360, 0.0, 0, {}, 0, "")
+    return FarWatch(seen, 0, 1.0, 13.0, 360, 0.0, 0, {}, 0, "")
 
 
 def test_the_age_over_a_link_begins_with_the_first_frame() -> None:
