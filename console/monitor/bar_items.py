@@ -111,25 +111,43 @@ def link_item(state: MonitorState, link: LinkText, now_s: float, stream: OwnStre
     return BarItem(link.mark, " \u00b7 ".join(filter(None, parts)), found.style, tip)
 
 
-def picture_item(age: PictureAge | None, frozen_s: float | None, stream: OwnStream | None = None) -> BarItem:
+def picture_item(
+    age: PictureAge | None,
+    frozen_s: float | None,
+    stream: OwnStream | None = None,
+    *,
+    others_ms: float | None = None,
+) -> BarItem:
     """Returns the age of the picture on the screen, and of a late one where most of it comes from.
 
     Args:
-        age: the reading; None without one.
+        age: the reading of this window; None without one.
         frozen_s: how long the picture has been frozen; None while it is live, or without a picture.
         stream: how the pictures of this window come; None before they do.
+        others_ms: the largest age that another viewer reports; it is no judgement of the picture here.
     """
     delivery = stream.text if stream else ""
     if frozen_s is not None:
         return BarItem(f"> {quantity(frozen_s, 's')}", "picture frozen", SeverityStyle.BAD, delivery)
-    if age is None:
+    if age is None and others_ms is None:
         return BarItem(UNKNOWN, "picture age", tip=joined("the age is not known", delivery))
+    if age is None:
+        tip = joined("the age of the picture here is not known", delivery)
+        return BarItem(quantity(others_ms, "ms", 0), "oldest of other viewers", tip=tip)
     found = PICTURE_AGE_MS.judge(age.age_ms)
     error = "" if age.error_ms is None else f" \u00b1 {math.ceil(age.error_ms)}"
     what = f"picture: {age.cause}" if found.word and age.cause else "picture age"
     longest = f"longest part: {age.cause}" if age.cause else ""
     word, detail = f"{age.age_ms:.0f}{error} ms", joined(found.word, what)
     return BarItem(word, detail, found.style, joined(longest, delivery))
+
+
+def reported_age_ms(state: MonitorState, now_s: float) -> float | None:
+    """Returns the largest age of a picture that any of the robot's viewers reports; None without a report."""
+    if state.snapshot is None:
+        return None
+    measured = state.snapshot.status.preview.measured
+    return None if _is_stale(measured, state, now_s) else measured.worst_picture_age_ms
 
 
 def mode_item(state: MonitorState, now_s: float) -> BarItem:

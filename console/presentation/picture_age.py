@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-from console.client.results import Freshness, PreviewStatus
-
 
 @dataclass(frozen=True, slots=True)
 class PictureAge:
@@ -18,11 +16,3 @@ class PictureAge:
     age_ms: float
     error_ms: float | None = None
     cause: str = ""
-
-
-def reported_age(preview: PreviewStatus) -> PictureAge | None:
-    """Returns the largest age that any of the robot's viewers reports; None if none does."""
-    measured = preview.measured
-    if measured.freshness is not Freshness.FRESH or measured.worst_picture_age_ms is None:
-        return None
-    return PictureAge(measured.worst_picture_age_ms, cause="oldest of all viewers")

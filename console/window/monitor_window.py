@@ -20,7 +20,7 @@ from console.monitor.trail import Trail
 from console.monitor.value_tiles import tile_items
 from console.monitor.worker import Worker
 from console.presentation.own_stream import OwnStream  # noqa: TC001  # read by the type checker alone
-from console.presentation.picture_age import PictureAge, reported_age
+from console.presentation.picture_age import PictureAge  # noqa: TC001  # the same
 from console.presentation.preview_switch import Note
 from console.presentation.severity_style import FAULT_STYLES, SeverityStyle
 from console.robots.roster import RobotChoice, Roster
@@ -77,8 +77,8 @@ class MonitorWindow(QWidget):
         super().__init__()
         self._worker = worker
         self.preview_actions = PreviewActions(self, worker)
-        self.read_picture_age: Callable[[], PictureAge | None] = self.reported_age
-        """Reads the age of the picture on the screen; by default from the robot's own report."""
+        self.read_picture_age: Callable[[], PictureAge | None] = lambda: None
+        """Reads the age of the picture on the screen; None while it is unknown."""
         self.read_worst_age_ms: Callable[[], float | None] = lambda: None
         """Reads the largest age of that picture in the last half second; None while it is unknown."""
         self.read_stream: Callable[[], OwnStream | None] = lambda: None
@@ -273,13 +273,6 @@ class MonitorWindow(QWidget):
     def _acknowledge_one(self, item: FaultItem) -> None:
         if item.occurrence:
             self.acknowledge(item.occurrence)
-
-    def reported_age(self) -> PictureAge | None:
-        """Returns the robot's own report; None while no viewer reports one."""
-        state = self._worker.latest()
-        if state.snapshot is None or state.outdated(time.monotonic()):
-            return None
-        return reported_age(state.snapshot.status.preview)
 
     def _report_sound(self, note: Note | None) -> None:
         if note:

@@ -145,7 +145,7 @@ def cockpit(
     window = MonitorWindow(robot.worker, changes, video, roster, pad, band=band)
     # The bar has the age; the card would cover the trail.
     video.show_age(False)
-    window.read_picture_age = partial(_age_of, robot.meter, window.reported_age)
+    window.read_picture_age = partial(_age_of, robot.meter)
     window.read_worst_age_ms = partial(robot.meter.worst_ms, STEP_S)
     window.read_stream = partial(_stream_of, robot.session)
     with _open(window, robot):
@@ -168,10 +168,10 @@ def viewing(
         yield window
 
 
-def _age_of(meter: PictureMeter, reported: Callable[[], PictureAge | None]) -> PictureAge | None:
+def _age_of(meter: PictureMeter) -> PictureAge | None:
     now = meter.reading()
     if now.age_ms is None:
-        return reported()
+        return None
     return PictureAge(now.age_ms, now.error_ms, now.cause.value if now.cause else "")
 
 

@@ -12,6 +12,7 @@ from console.monitor.bar_items import (
     link_item,
     mode_item,
     picture_item,
+    reported_age_ms,
 )
 from console.monitor.link import LinkText
 from console.monitor.monitor_state import MonitorState
@@ -53,7 +54,7 @@ class TopBar(QWidget):
         self.health = Cell("Health", ("DEGRADED", "2 errors, 2 warnings"), Marker())
         self.battery = Cell("Battery", ("100 %", "LOW, 12.6 V"), self.battery_gauge)
         self.link = Cell("Link", _WIDEST_LINK, Marker())
-        self.picture = Cell("Picture", ("1000 \u00b1 10 ms", "LATE, picture: encoder"), Marker())
+        self.picture = Cell("Picture", ("1000 \u00b1 10 ms", "oldest of other viewers"), Marker())
         self.mode = Cell("Mode", ("autonomous", "last known"), None)
         self.clock = Cell("Time", ("23:59:59", "UTC+00:00"), None)
         self.panel_button = _button("Panel", "Side panel (F9)", checkable=True)
@@ -91,7 +92,8 @@ class TopBar(QWidget):
         self.battery.show_item(battery)
         self.health.show_item(health_item(state, now_s))
         self.link.show_item(link_item(state, link, now_s, stream))
-        self.picture.show_item(picture_item(age, frozen_s, stream))
+        others_ms = reported_age_ms(state, now_s)
+        self.picture.show_item(picture_item(age, frozen_s, stream, others_ms=others_ms))
         self.mode.show_item(mode_item(state, now_s))
         self.clock.show_item(clock_item())
 

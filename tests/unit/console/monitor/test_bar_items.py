@@ -14,11 +14,12 @@ from console.monitor.bar_items import (
     link_item,
     mode_item,
     picture_item,
+    reported_age_ms,
 )
 from console.monitor.link import Link, LinkState, link_text
 from console.monitor.monitor_state import MonitorState
 from console.presentation.own_stream import OwnStream
-from console.presentation.picture_age import PictureAge, reported_age
+from console.presentation.picture_age import PictureAge
 from console.presentation.severity_style import SeverityStyle
 from omniseer.gateway.v1 import overlay_pb2
 from omniseer.gateway.v1 import states_pb2 as states
@@ -175,15 +176,25 @@ def test_a_late_picture_says_what_takes_longest(age: PictureAge, detail: str) ->
     assert picture_item(age, None).detail == detail
 
 
-def test_the_robots_own_report_is_read() -> None:
+def test_the_age_of_another_viewers_picture_is_no_word_about_the_one_here() -> None:
+    stream = OwnStream("SRT latency")
+    item = picture_item(None, None, stream, others_ms=18)
+    assert (item.word, item.detail, item.style) == ("18 ms", "oldest of other viewers", SeverityStyle.QUIET)
+    assert item.tip.endswith("not known, SRT latency")
+    assert picture_item(None, None, others_ms=900).style is SeverityStyle.QUIET
+    assert picture_item(PictureAge(118), None, others_ms=900) == picture_item(PictureAge(118), None)
+    assert picture_item(None, 2.0, others_ms=18) == picture_item(None, 2.0)
+
+
+def test_the_report_of_other_viewers_is_read() -> None:
     def change(made: overlay_pb2.OverlaySnapshot) -> None:
         measured = made.status.preview.measured
         measured.available, measured.worst_picture_age_ms = True, 118
 
-    assert reported_age(snapshot().status.preview) is None
-    reading = reported_age(snapshot(change).status.preview)
-    assert reading
-    assert reading.age_ms == 118
+    assert reported_age_ms(EMPTY, NOW_S) is None
+    assert reported_age_ms(heard(), NOW_S) is None
+    assert reported_age_ms(heard(snapshot(change)), NOW_S) == 118
+    assert reported_age_ms(heard(snapshot(change)), NOW_S + 60) is None, "the robot is silent"
 
 
 def test_the_mode_stays_valid() -> None:
