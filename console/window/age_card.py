@@ -15,6 +15,7 @@ _PAPER: Final = QColor(16, 18, 20, 225)
 _INK: Final = QColor("#FFFFFF")
 _DIM_INK: Final = QColor("#C8CCD0")
 _QUIET: Final = QColor("#8A9099")
+_UNKNOWN_AGE: Final = "age not known"
 _PAD: Final = 4.0
 _STRIPE: Final = 5.0
 _GAP: Final = 6.0
@@ -49,8 +50,8 @@ class AgeCard:
         return changed
 
     def paint(self, painter: QPainter, whole: QRectF) -> None:
-        """Paints the card, if the age is known."""
-        if not self._reading.age_text:
+        """Paints the card, if the age is known, or round trip and loss are."""
+        if not (self._reading.age_text or self._reading.link_text):
             return
         ratio = painter.device().devicePixelRatioF()
         if self._drawn is None or self._drawn.devicePixelRatioF() != ratio:
@@ -64,7 +65,7 @@ def _drawn(now: PictureReading, history: Sequence[float | None], font: QFont, ra
     bold.setBold(True)
     metrics = QFontMetricsF(bold)
     line = metrics.height()
-    texts = (now.age_text, now.link_text)
+    texts = (now.age_text or _UNKNOWN_AGE, now.link_text)
     width = max(_PLOT_WIDTH, *(metrics.horizontalAdvance(text) for text in texts)) + 2 * _PAD + _STRIPE
     card = QRectF(0, 0, width, 2 * line + _PLOT_HEIGHT + 3 * _PAD)
     drawn = QPixmap((card.size() * ratio).toSize())

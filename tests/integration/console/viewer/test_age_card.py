@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor, QImage, QPainter
 
 from console.client import Offset
 from console.presentation.severity_style import SeverityStyle
+from console.receiver.delivery import Delivery, DeliveryChoice
 from console.viewer.picture_meter import PictureMeter
 from console.window.age_card import AgeCard
 from console.window.theme import COLOURS
@@ -67,6 +68,16 @@ def test_without_an_age_there_is_no_card(meter: PictureMeter) -> None:
     assert len(colours(card)) > 1
     meter.forget()
     assert colours(card) == {GROUND.name()}
+
+
+def test_round_trip_and_loss_are_shown_without_an_age() -> None:
+    """Of a robot that does not report when it captures a frame."""
+    delivery = Delivery(kind=DeliveryChoice.DIRECT, rtt_ms=20.0, loss_percent=1.2)
+    meter = PictureMeter(lambda: None, lambda: delivery)
+    meter.shown(frame())
+    found = colours(AgeCard(meter))
+    assert len(found) > 1
+    assert not found & {colour.name() for colour in COLOURS.values()}, "no judgement of an age"
 
 
 def test_it_changes_a_few_times_a_second(meter: PictureMeter) -> None:
