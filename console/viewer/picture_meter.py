@@ -45,6 +45,7 @@ class AgeSummary:
         median_ms: half of them were younger.
         p95_ms: 95 % of them were younger.
         worst_ms: the largest age of a picture on the screen, while the next one was overdue as well.
+        last_ms: of the last picture, when it was shown.
         error_ms: bound of the error of all ages.
         cause: why the last picture was older than 150 ms; None if it was not.
     """
@@ -52,6 +53,7 @@ class AgeSummary:
     median_ms: float
     p95_ms: float
     worst_ms: float
+    last_ms: float
     error_ms: float
     cause: AgeCause | None
 
@@ -179,6 +181,7 @@ class PictureMeter:
             median_ms=round(statistics.median(ages_ms), 1),
             p95_ms=round(p95_ms, 1),
             worst_ms=round(self._worst_since_ms(pictures[0].at_s), 1),
+            last_ms=round(last.age_ms, 1),
             error_ms=round(max(picture.error_ms for picture in pictures), 2),
             cause=reading(last, self._delivery(), self._preview(), last.at_s).cause,
         )

@@ -246,14 +246,20 @@ def test_the_summary_has_percentiles(played: Played) -> None:
     assert found
     assert (found.median_ms, found.worst_ms, found.error_ms) == (59.5, 109.0, 1.5)
     assert found.p95_ms == pytest.approx(104, abs=1)
+    assert found.last_ms == 109.0
     assert found.cause is None
+    played.show(12.34)
+    played.now_s += 2.0
+    found = played.meter.summary()
+    assert found
+    assert found.last_ms == 12.3, "as it was shown; how long it stood is in the worst"
 
 
 def test_one_picture_is_its_own_percentile(played: Played) -> None:
     played.show(200, own_ms=190)
     found = played.meter.summary()
     assert found
-    assert (found.median_ms, found.p95_ms, found.worst_ms) == (200, 200, 200)
+    assert (found.median_ms, found.p95_ms, found.worst_ms, found.last_ms) == (200, 200, 200, 200)
     assert found.cause is not None
 
 
