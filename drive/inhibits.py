@@ -1,5 +1,6 @@
-"""Reasons why the robot must not move now. Pure."""
+"""Reasons why no driver must move the robot now. Pure."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from drive.values import MS, Command, Inhibit, Lease, Supervision, Surroundings
@@ -30,35 +31,45 @@ def inhibits(
     surroundings: Surroundings,
     now_ns: int,
     deadlines: Deadlines,
+    *,
+    publishing: bool,
 ) -> frozenset[Inhibit]:
-    """Returns all reasons why the holder of the lease must not move the robot.
+    """Returns all reasons why a driver must not move the robot: its own also without a driver.
 
     Args:
-        lease: None without a driver: then there is nothing to inhibit.
+        lease: None without a driver.
         command: the newest of this lease; None before the first, which moves nothing.
         surroundings: as last observed.
         now_ns: the present instant.
         deadlines: as configured.
+        publishing: whether velocities or zeros are published.
     """
-    if lease is None:
-        return frozenset()
     reasons = set[Inhibit]()
     if surroundings.robot_stopped:
         reasons.add(Inhibit.ROBOT_STOP)
     if not surroundings.base_present:
         reasons.add(Inhibit.BASE_ABSENT)
-    if surroundings.outranked:
+    # What moves the robot while nothing is published here need not outrank a driver.
+    if surroundings.outranked and (lease is not None or publishing):
         reasons.add(Inhibit.OUTRANKED)
-    if command is not None and lease.streaming:
+    if lease is not None and command is not None:
+        reasons.update(_of_the_driver(lease, command, surroundings, now_ns, deadlines))
+    return frozenset(reasons)
+
+
+def _of_the_driver(
+    lease: Lease, command: Command, surroundings: Surroundings, now_ns: int, deadlines: Deadlines
+) -> Iterator[Inhibit]:
+    """Yields what is wrong with the newest command, and with the picture that it reports."""
+    if lease.streaming:
         if now_ns > command.valid_until_ns:
-            reasons.add(Inhibit.COMMAND_LATE)
+            yield Inhibit.COMMAND_LATE
         elif now_ns > command.echo_ns + deadlines.loop_ns:
-            reasons.add(Inhibit.LOOP_LATE)
-    if command is not None and lease.supervision is Supervision.PICTURE:
+            yield Inhibit.LOOP_LATE
+    if lease.supervision is Supervision.PICTURE:
         reason = _picture(command, surroundings, now_ns, deadlines)
         if reason:
-            reasons.add(reason)
-    return frozenset(reasons)
+            yield reason
 
 
 def _picture(

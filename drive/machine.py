@@ -114,6 +114,7 @@ class State:
         command: newest of the present lease.
         command_ns: when it arrived.
         since_ns: when the phase began.
+        inhibits: why a driver must not move the robot; its own reasons also without a driver.
         output: what is to be published; None for nothing.
         output_ns: when `output` was computed.
         released_at: output at the release that STOPPING slows down from; ZERO for an immediate stop.
@@ -195,7 +196,14 @@ def step(state: State, event: Event, now_ns: int, rules: Rules) -> State:
     """
     before = state
     state, trigger = _taken(before, event, now_ns, rules)
-    reasons = inhibits(state.lease, state.command, state.surroundings, now_ns, rules.deadlines)
+    reasons = inhibits(
+        state.lease,
+        state.command,
+        state.surroundings,
+        now_ns,
+        rules.deadlines,
+        publishing=before.output is not None,
+    )
     if reasons != state.inhibits:
         state = replace(state, inhibits=reasons)
     if trigger:
@@ -313,7 +321,8 @@ def _commanded(state: State, command: Command, now_ns: int, deadlines: Deadlines
 
 def _conditions(before: State, state: State, now_ns: int) -> tuple[Trigger, ...]:
     """Returns what holds at this instant, whatever the event was."""
-    if state.inhibits:
+    if state.inhibits and state.lease:
+        # Without a driver they are only known: there is no motion to end, and no release that they wait for.
         return (Trigger.INHIBIT,)
     if state.command is None:
         return ()  # Nothing is known of the driver's hands.

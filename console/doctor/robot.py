@@ -21,6 +21,8 @@ _FALLBACK: Final = "preview.fallback"
 """Another encoder than the first choice works as well, and on a machine without hardware it always is one."""
 _OF_THE_FLEET: Final = "cloud."
 """What the ids of the fleet's faults begin with."""
+_OF_DRIVING: Final = "drive."
+"""What the ids of the faults of driving begin with."""
 
 
 def version_finding(gateway_version: str, own_version: str) -> Finding:
@@ -163,6 +165,9 @@ def driving_findings(status: SystemStatus) -> Iterator[Finding]:
         yield note("driving", what, "Nothing moves until that is reset", remedy)
     else:
         yield from _obstacles(teleop)
+        if _can_be_driven(status):
+            who = f"{teleop.holder} drives" if teleop.holder else "no one drives"
+            yield good("driving", f"the robot can be driven; {who}")
     yield _base_timeout(teleop.base_timeout_ms)
 
 
@@ -172,11 +177,14 @@ def _obstacles(teleop: Teleop) -> Iterator[Finding]:
             yield note(
                 "driving", SENTENCES[inhibit], "The robot does not move for a driver", _INHIBITED[inhibit]
             )
-    if not teleop.enabled and not teleop.inhibits:
+    if not teleop.enabled and DriveInhibit.DRIVE_LOST not in teleop.inhibits:
         yield note("driving", "driving is disabled", "No one can drive", "Type: robotctl drive --enable")
-    elif not teleop.inhibits:
-        who = f"{teleop.holder} drives" if teleop.holder else "no one drives"
-        yield good("driving", f"the robot can be driven; {who}")
+
+
+def _can_be_driven(status: SystemStatus) -> bool:
+    """Returns whether nothing is known that keeps the robot from being driven, its faults included."""
+    faulted = any(fault.active and fault.id.startswith(_OF_DRIVING) for fault in status.faults)
+    return status.teleop.enabled and not status.teleop.inhibits and not faulted
 
 
 def _base_timeout(timeout_ms: int | None) -> Finding:

@@ -25,10 +25,12 @@ def driving_text(teleop: Teleop) -> str:
     drives = f"{teleop.holder} drives" if teleop.holder else ""
     if stop := teleop.stop:
         return joined(stopped_by(stop), drives, f"type: robotctl reset-stop {stop.stop_id}")
+    disabled = teleop.phase is DrivePhase.DISABLED and DriveInhibit.DRIVE_LOST not in teleop.inhibits
+    enabling = "type: robotctl drive --enable" if disabled else ""
     if teleop.inhibits:
         reasons = (SENTENCES[inhibit] for inhibit in teleop.inhibits)
         holds = _MOVES_AGAIN if teleop.phase is DrivePhase.INHIBITED else ""
-        return joined(drives, *reasons, holds)
-    if teleop.phase is DrivePhase.DISABLED:
-        return "type: robotctl drive --enable"
+        return joined(drives, *reasons, holds, enabling)
+    if enabling:
+        return enabling
     return drives or ("no one drives" if teleop.phase is DrivePhase.AVAILABLE else "")

@@ -180,6 +180,7 @@ class TeleopView:
     """Driving as operators see it.
 
     Attributes:
+        inhibits: why the robot does not move for a driver; its own reasons also when no one drives.
         holder: who has the lease, for people; empty when no one drives.
         command: the newest that was accepted; None before the first.
         last_error: why the newest command was refused; empty when it was not.

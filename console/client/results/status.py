@@ -89,7 +89,7 @@ class Teleop:
     last_command: TeleopCommand
     phase: DrivePhase
     inhibits: tuple[DriveInhibit, ...]
-    """Why the robot does not move for its driver."""
+    """Why the robot does not move for a driver. Its own reasons also when no one drives."""
     holder: str
     """Who drives. Empty when no one does."""
     stop: StopLatch | None

@@ -34,6 +34,7 @@ def test_it_is_pressed_until_a_live_publisher_says_otherwise(
     def attempt() -> None:
         peer = robot.ready()
         with robot.same_worker():
+            wait_until(lambda: pb.INHIBIT_ROBOT_STOP in robot.state().inhibits, "known without a driver")
             peer.send(lease="anna", held=False)
             robot.phase_is("INHIBITED")
             wait_until(lambda: list(robot.state().inhibits) == [pb.INHIBIT_ROBOT_STOP], "the one reason")
@@ -59,7 +60,7 @@ def test_it_is_pressed_until_a_live_publisher_says_otherwise(
 
 @contextmanager
 def leased(robot: Driving) -> Iterator[None]:
-    """A driver who does not hold, so that the reasons to inhibit are reported; see `Driving.same_worker`."""
+    """A driver who does not hold, so that a reason inhibits, and its end arms; see `Driving.same_worker`."""
     peer = robot.ready()
     with robot.same_worker():
         peer.send(lease="anna", held=False)

@@ -484,6 +484,51 @@ def test_surroundings_that_must_not_move(surroundings: Surroundings, expected: I
     assert robot.state.output == ZERO
 
 
+@pytest.mark.parametrize(
+    ("surroundings", "expected"),
+    [
+        (replace(CLEAR, robot_stopped=True), {Inhibit.ROBOT_STOP}),
+        (replace(CLEAR, base_present=False), {Inhibit.BASE_ABSENT}),
+        (replace(CLEAR, preview_running=False), set()),
+        (replace(CLEAR, outranked=True), set()),
+    ],
+    ids=["the robot's own stop", "no base", "no picture", "another source has the robot"],
+)
+@pytest.mark.parametrize("phase", [Phase.DISABLED, Phase.AVAILABLE])
+def test_without_a_driver_the_robots_own_reasons_are_known_and_change_no_phase(
+    phase: Phase, surroundings: Surroundings, expected: set[Inhibit]
+) -> None:
+    """A picture is a driver's; and what moves the robot then need not outrank one."""
+    robot = in_phase(phase)
+    robot.feed(Observe(surroundings))
+    assert robot.state.inhibits == expected
+    assert (robot.state.phase, robot.state.output) == (phase, None)
+    robot.feed(Observe(CLEAR))
+    assert not robot.state.inhibits
+
+
+def test_a_source_that_moves_the_robot_past_the_zeros_of_a_stop_is_a_reason_without_a_driver() -> None:
+    robot = Robot()
+    robot.feed(Stop("ben"))
+    robot.feed(Observe(replace(CLEAR, outranked=True)))
+    assert robot.state.inhibits == {Inhibit.OUTRANKED}
+
+
+def test_the_robots_own_stop_does_not_keep_it_from_others_after_a_drive() -> None:
+    robot = Robot().armed()
+    robot.feed(EndLease("s1", LeaseEnd.CLOSED))
+    robot.feed(Observe(replace(CLEAR, robot_stopped=True)))
+    assert robot.state.phase is Phase.STOPPING
+    assert robot.after(500).phase is Phase.AVAILABLE
+    assert robot.state.inhibits == {Inhibit.ROBOT_STOP}
+
+
+def test_a_driver_who_comes_while_the_robots_own_stop_is_active_is_inhibited_at_once() -> None:
+    robot = Robot()
+    robot.feed(Observe(replace(CLEAR, robot_stopped=True)))
+    assert robot.armed().state.phase is Phase.INHIBITED
+
+
 def test_only_the_holders_newer_commands_count() -> None:
     robot = Robot().driving()
     newest = robot.state.command

@@ -26,7 +26,17 @@ from drive.machine import (
 )
 from drive.phases import Phase
 from drive.shaping import Limits, approached, limited, supervised
-from drive.values import MS, ZERO, Command, Lease, LeaseEnd, Supervision, Surroundings, Velocity
+from drive.values import (
+    MS,
+    ZERO,
+    Command,
+    Inhibit,
+    Lease,
+    LeaseEnd,
+    Supervision,
+    Surroundings,
+    Velocity,
+)
 
 SESSIONS = ("s1", "s2", "s3")
 speeds = st.floats(-2, 2)
@@ -100,6 +110,7 @@ class Driving(RuleBasedStateMachine):
         self.nothing_is_published_when_nobody_drives()
         self.a_stop_stays_until_its_reset()
         self.the_sequence_only_grows()
+        self.reasons_are_known_with_and_without_a_driver()
 
     @rule(ms=st.integers(0, 700))
     def pass_time(self, ms: int) -> None:
@@ -368,6 +379,16 @@ class Driving(RuleBasedStateMachine):
             return False
         valid_until_ns = min(self.newest.valid_until_ns, self.arrived_ns + 250 * MS)
         return self.lease.streaming and self.now_ns <= valid_until_ns
+
+    def reasons_are_known_with_and_without_a_driver(self) -> None:
+        state, around = self.state, self.state.surroundings
+        assert (Inhibit.ROBOT_STOP in state.inhibits) == around.robot_stopped
+        assert (Inhibit.BASE_ABSENT in state.inhibits) == (not around.base_present)
+        if self.lease is None:
+            assert state.phase is not Phase.INHIBITED, "of which only a driver's release is the end"
+            assert state.inhibits <= {Inhibit.ROBOT_STOP, Inhibit.BASE_ABSENT, Inhibit.OUTRANKED}
+            silent = self.before.output is None
+            assert (Inhibit.OUTRANKED in state.inhibits) == (around.outranked and not silent)
 
     def the_sequence_only_grows(self) -> None:
         before, after = self.before.command, self.state.command

@@ -2,6 +2,7 @@
 
 import socket
 from collections import deque
+from dataclasses import replace
 from itertools import chain, repeat
 from types import SimpleNamespace
 from typing import Any
@@ -411,6 +412,14 @@ def test_nothing_moves_before_the_guard_reaches_the_base(world: World) -> None:
     assert list(report.problems) == [
         "the guard of robot-drive does not reach the base yet, and could not stop it"
     ]
+
+
+def test_a_report_without_a_driver_has_the_robots_own_reasons(world: World) -> None:
+    world.surroundings = replace(world.surroundings, robot_stopped=True)
+    world.end(210)
+    world.worker.run()
+    report = world.worker._actual(world.now_ns)
+    assert (report.phase, list(report.inhibits)) == (pb.PHASE_AVAILABLE, [pb.INHIBIT_ROBOT_STOP])
 
 
 def test_a_guard_that_reaches_the_base_no_more_ends_the_motion(world: World) -> None:

@@ -13,6 +13,7 @@ import pytest
 
 from common.findings import Finding, Verdict
 from common.version import project_version
+from console.client.mapping.methods import GET_SYSTEM_STATUS
 from console.doctor import network, robot
 from console.doctor.examination import examine, reached
 from console.doctor.srt_probe import answers_as_srt, induction, is_answer
@@ -250,8 +251,55 @@ def test_what_keeps_a_robot_from_being_driven_is_found(double: GatewayDouble) ->
     assert "500 ms" in examined(double)["driving.base"].what
     teleop.inhibits.append(teleop_pb2.DRIVE_INHIBIT_DRIVE_LOST)
     assert "robot-drive" in examined(double)["driving"].remedy
-    teleop.inhibits[:] = [teleop_pb2.DRIVE_INHIBIT_OUTRANKED]
+    teleop.enabled, teleop.inhibits[:] = True, [teleop_pb2.DRIVE_INHIBIT_OUTRANKED]
     assert "what else drives" in examined(double)["driving"].remedy
+
+
+def of_driving(double: GatewayDouble) -> list[Finding]:
+    """The findings on driving, but on the base's timeout."""
+    status = GET_SYSTEM_STATUS.decode(double.status.SerializeToString())
+    return [finding for finding in robot.driving_findings(status) if finding.check == "driving"]
+
+
+ROBOTS_OWN = [
+    teleop_pb2.DRIVE_INHIBIT_ROBOT_STOP,
+    teleop_pb2.DRIVE_INHIBIT_BASE_ABSENT,
+    teleop_pb2.DRIVE_INHIBIT_OUTRANKED,
+    teleop_pb2.DRIVE_INHIBIT_DRIVE_LOST,
+]
+
+
+@pytest.mark.parametrize("holder", ["", "anna"])
+@pytest.mark.parametrize("inhibit", ROBOTS_OWN)
+def test_a_robot_that_moves_for_no_driver_is_never_found_good(
+    double: GatewayDouble, inhibit: teleop_pb2.DriveInhibit.ValueType, holder: str
+) -> None:
+    teleop = double.status.teleop
+    teleop.state, teleop.enabled, teleop.holder = states.TELEOP_ENABLED, True, holder
+    teleop.inhibits.append(inhibit)
+    assert [found.verdict for found in of_driving(double)] == [Verdict.NOTE]
+
+
+def test_no_fault_of_driving_stands_beside_a_robot_that_can_be_driven(double: GatewayDouble) -> None:
+    teleop = double.status.teleop
+    teleop.state, teleop.enabled = states.TELEOP_ENABLED, True
+    fault = double.status.faults.add(id="drive.base", severity=FAULT_SEVERITY_WARNING, active=True)
+    fault.message = "the robot can't be driven: nothing takes the velocities"
+    found = examined(double)
+    assert found["fault.drive.base"].verdict is Verdict.WRONG
+    assert "driving" not in found
+    fault.active = False
+    assert examined(double)["driving"].verdict is Verdict.GOOD
+
+
+def test_driving_that_is_disabled_is_found_beside_the_robots_own_reasons(double: GatewayDouble) -> None:
+    teleop = double.status.teleop
+    teleop.state = states.TELEOP_DISABLED
+    teleop.inhibits.append(teleop_pb2.DRIVE_INHIBIT_ROBOT_STOP)
+    assert [found.remedy for found in of_driving(double)] == [
+        "Release the robot's own stop",
+        "Type: robotctl drive --enable",
+    ]
 
 
 def test_a_robot_of_a_fleet_says_whether_it_is_connected(double: GatewayDouble) -> None:

@@ -132,6 +132,10 @@ def test_others_see_who_drives_and_why_nothing_moves() -> None:
     assert stopped
     assert (stopped.driver, stopped.stop) == ("No driver", STOP)
     assert "bert: lunch" in stopped.reason
+    inhibits = (DriveInhibit.ROBOT_STOP,)
+    pressed = watched_display(teleop(phase=DrivePhase.AVAILABLE, inhibits=inhibits))
+    assert pressed
+    assert (pressed.driver, pressed.reason) == ("No driver", "The robot's own stop is active")
 
 
 def test_an_earlier_gateway_has_no_phases() -> None:

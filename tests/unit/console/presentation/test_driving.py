@@ -65,6 +65,14 @@ def test_a_drive_program_that_is_lost_is_no_disabled_one() -> None:
     assert "robotctl drive --enable" in row(phase=teleop_pb2.DRIVE_PHASE_DISABLED).text
 
 
+def test_the_robots_own_reasons_stand_without_a_driver_and_hide_no_remedy() -> None:
+    inhibits = [teleop_pb2.DRIVE_INHIBIT_ROBOT_STOP]
+    available = row(phase=teleop_pb2.DRIVE_PHASE_AVAILABLE, inhibits=inhibits).text
+    assert available.startswith("the robot's own stop is active, at most")
+    disabled = row(phase=teleop_pb2.DRIVE_PHASE_DISABLED, inhibits=inhibits).text
+    assert disabled.startswith("the robot's own stop is active, type: robotctl drive --enable")
+
+
 def test_what_is_outdated_is_the_last_known() -> None:
     found = row(outdated=True, phase=teleop_pb2.DRIVE_PHASE_DRIVING, holder="anna")
     assert (found.mark, found.text.startswith("last known: DRIVING, anna drives")) == ("STALE", True)

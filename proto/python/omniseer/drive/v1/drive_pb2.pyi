@@ -666,7 +666,9 @@ class ActualState(_message.Message):
     """
     @_builtins.property
     def inhibits(self) -> _containers.RepeatedScalarFieldContainer[Global___Inhibit.ValueType]:
-        """Why nothing moves."""
+        """Why nothing moves for a driver. The robot's own reasons also without one: ROBOT_STOP, BASE_ABSENT, and OUTRANKED
+        while velocities or zeros are published. A drive program of an earlier release has none then.
+        """
 
     @_builtins.property
     def stop(self) -> Global___Latch:

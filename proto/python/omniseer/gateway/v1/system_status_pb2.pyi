@@ -333,7 +333,11 @@ class TeleopStatus(_message.Message):
     """
     @_builtins.property
     def inhibits(self) -> _containers.RepeatedScalarFieldContainer[_teleop_pb2.DriveInhibit.ValueType]:
-        """Why the robot does not move for its driver. Empty when nothing is in the way, and without a driver."""
+        """Why the robot does not move for a driver. The robot's own reasons stand also while no one drives:
+        DRIVE_INHIBIT_ROBOT_STOP and _BASE_ABSENT, _OUTRANKED while the robot is stopped or coming to rest, and
+        _DRIVE_LOST. Empty when nothing is in the way; from a robot of an earlier release also without a driver,
+        whatever is.
+        """
 
     @_builtins.property
     def stop(self) -> _teleop_pb2.StopLatch:
