@@ -10,7 +10,7 @@ import time
 from typing import Final, Protocol
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
-from PySide6.QtGui import QGuiApplication, QKeyEvent
+from PySide6.QtGui import QGuiApplication, QKeyEvent, QMouseEvent
 from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QLineEdit, QPlainTextEdit, QTextEdit, QWidget
 
 from console.client.drive_commands import HOLD_COUNTS_S
@@ -65,17 +65,18 @@ class DriveHands(QObject):
     Args:
         window: whose keys count, while it is active.
         driver: is held and released.
+        stop_place: the button STOP of the window.
         pad: a gamepad; None without one.
     """
 
     stopped = Signal()
-    """Space, or the gamepad's button for it, was pressed on a robot that can be driven."""
+    """Space, or the gamepad's button for it, was pressed, or STOP beside an open menu."""
     ticked = Signal()
     """Every 10 ms while `driveable`."""
 
-    def __init__(self, window: QWidget, driver: Driver, pad: Pad | None = None) -> None:
+    def __init__(self, window: QWidget, driver: Driver, stop_place: QWidget, pad: Pad | None = None) -> None:
         super().__init__(window)
-        self._window, self._driver, self.pad = window, driver, pad
+        self._window, self._driver, self._stop_place, self.pad = window, driver, stop_place, pad
         self.driveable = False
         """Whether the robot can be driven, so that Space is STOP. Stays as it was while no robot answers."""
         self._down: dict[tuple[int, int], Direction] = {}
@@ -111,6 +112,9 @@ class DriveHands(QObject):
         if kind in _LEAVING or (kind is QEvent.Type.Hide and watched is self._window):
             if self._is_ours(watched):
                 self.release()
+            return False
+        if kind is QEvent.Type.MouseButtonPress and self._is_on_stop(watched, event):
+            self.stopped.emit()
             return False
         if kind not in _KEY_EVENTS or not isinstance(watched, QWidget) or not self._is_ours(watched):
             return False
@@ -150,11 +154,23 @@ class DriveHands(QObject):
             and (event.modifiers() == Qt.KeyboardModifier.NoModifier or not _in_text())
         )
 
+    def _is_on_stop(self, watched: QObject, event: QEvent) -> bool:
+        """Whether STOP is pressed beside an open menu, which would take that for a request to close."""
+        popup = QApplication.activePopupWidget()
+        if popup is None or watched is not popup:
+            return False
+        assert isinstance(event, QMouseEvent), "by its type"  # noqa: S101  # Qt's rule
+        on_stop = QApplication.widgetAt(event.globalPosition().toPoint()) is self._stop_place
+        if on_stop:
+            # Else some platforms repeat the press for what lies below: one press is one stop.
+            popup.setAttribute(Qt.WidgetAttribute.WA_NoMouseReplay)
+        return on_stop
+
     def _is_ours(self, watched: QObject) -> bool:
         """Whether an object belongs to this window, or to a menu or dialog of it."""
         each: QObject | None = watched
         while each is not None and each is not self._window:
-            each = each.parent()
+            each = each.parent() or _field_of(each)
         return each is self._window
 
     def _counts(self) -> bool:
@@ -191,6 +207,11 @@ class DriveHands(QObject):
             self._driver.release()
         else:
             self._driver.hold(steering, "gamepad" if by_pad else "keyboard")
+
+
+def _field_of(watched: QObject) -> QObject | None:
+    """Returns the text field of a list of suggestions, which has no parent; None for anything else."""
+    return watched.focusProxy() if isinstance(watched, QWidget) else None
 
 
 def _place(event: QKeyEvent) -> tuple[int, int]:

@@ -42,7 +42,7 @@ class Driving(QObject):
         super().__init__(window)
         self._worker, self._driver = worker, worker.driver
         self._strip, self._picture = strip, picture
-        self.hands = DriveHands(window, worker.driver, pad)
+        self.hands = DriveHands(window, worker.driver, strip.driving.stop_place, pad)
         self._ticks = 0
         self._pad_problem = ""
         """The one that was shown last."""

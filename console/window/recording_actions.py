@@ -4,7 +4,7 @@ import time
 from pathlib import Path
 
 from PySide6.QtCore import QObject, QStandardPaths, Qt
-from PySide6.QtWidgets import QFileDialog, QMessageBox
+from PySide6.QtWidgets import QMessageBox
 
 from common.plain_name import plain_name
 from console.client import GatewayError
@@ -21,6 +21,7 @@ from console.monitor.recordings import ExportState
 from console.monitor.worker import Worker
 from console.presentation.preview_switch import Note
 from console.presentation.severity_style import SeverityStyle
+from console.window.folder_dialog import FolderDialog
 from console.window.picture_area import PictureArea
 from console.window.recordings_tab import RecordingsTab
 
@@ -51,6 +52,8 @@ class RecordingActions(QObject):
         """Where exports are put."""
         self.question: QMessageBox | None = None
         """The confirmation that is asked for; None while there is none."""
+        self.folder_dialog: FolderDialog | None = None
+        """In which the folder is chosen; None while it is not."""
         tab.record_pressed.connect(self.record)
         tab.keep_pressed.connect(self.keep)
         tab.export_pressed.connect(self.export)
@@ -116,7 +119,9 @@ class RecordingActions(QObject):
         self._recordings.pin(item.recording.id, not item.recording.pinned)
 
     def delete(self, item: RecordingItem) -> None:
-        """Deletes a recording, once that is confirmed."""
+        """Deletes a recording, once that is confirmed. A question that is open already gives way."""
+        if self.question:
+            self.question.close()
         box = QMessageBox(self._tab.window())
         box.setIcon(QMessageBox.Icon.Warning)
         box.setWindowTitle("Delete a recording")
@@ -128,17 +133,21 @@ class RecordingActions(QObject):
         delete.clicked.connect(lambda: self._recordings.delete(item.recording))
         box.finished.connect(self._forget_question)
         self.question = box
-        # Not exec(): the window goes on to show the robot.
-        box.open()
+        # Not modal: the window goes on to show the robot, and its STOP to work.
+        box.setModal(False)
+        box.show()
 
     def choose_folder(self) -> None:
         """Asks where exports are put."""
-        dialog = QFileDialog(self._tab.window(), "Put exports into", str(self.folder))
-        dialog.setFileMode(QFileDialog.FileMode.Directory)
-        dialog.setOption(QFileDialog.Option.ShowDirsOnly)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        if self.folder_dialog:
+            self.folder_dialog.raise_()
+            self.folder_dialog.activateWindow()
+            return
+        dialog = FolderDialog(self._tab.window(), "Put exports into", self.folder)
         dialog.fileSelected.connect(self._take_folder)
-        dialog.open()
+        dialog.finished.connect(self._forget_folder_dialog)
+        self.folder_dialog = dialog
+        dialog.show()
 
     def _take_folder(self, name: str) -> None:
         self.folder = Path(name)
@@ -146,6 +155,9 @@ class RecordingActions(QObject):
 
     def _forget_question(self) -> None:
         self.question = None
+
+    def _forget_folder_dialog(self) -> None:
+        self.folder_dialog = None
 
     def _robots_folder(self) -> Path:
         snapshot = self._worker.latest().snapshot

@@ -28,6 +28,8 @@ _MARK: Final = "ROBOT_GATEWAY_TEST_RUN"
 GONE_WITHIN_S = 10.0
 _PORTS_OF_THE_PROCESS: Final = "@robot-gateway-ports-"
 """The claim of a process on its block of free ports, which it keeps (tests/support/free.py)."""
+_TYPES_OF_FILES: Final = "mime.cache"
+"""The system's list of types of files: Qt keeps it open from the first file dialog of a process on."""
 _GONE: Final = "gone"
 _UNNAMED: Final = "unnamed descriptor"
 _MAY_STAY: Final = Counter({_UNNAMED: 16})
@@ -148,7 +150,8 @@ def _descriptors() -> Iterator[str]:
                 if not str(known.laddr).startswith(_PORTS_OF_THE_PROCESS):
                     yield f"socket {known.type.name} {known.laddr}"
             elif path.is_absolute():
-                yield f"file {path}"
+                if path.name != _TYPES_OF_FILES:
+                    yield f"file {path}"
             elif path.name.startswith("pipe:"):
                 yield "pipe"
             elif not (path.name.startswith("socket:") and _belongs_to_fast_dds(int(entry.name))):

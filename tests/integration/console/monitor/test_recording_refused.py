@@ -10,7 +10,16 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QComboBox, QLineEdit, QListWidget, QProgressBar, QWidget
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QComboBox,
+    QFileDialog,
+    QLineEdit,
+    QListWidget,
+    QMessageBox,
+    QProgressBar,
+    QWidget,
+)
 
 from console.presentation.severity_style import SeverityStyle
 from console.window.monitor_window import MonitorWindow
@@ -204,6 +213,38 @@ def test_a_refusal_is_said_in_the_robots_words(window: MonitorWindow, robot: Rob
     QTest.mouseClick(delete, Qt.MouseButton.LeftButton)
     said(window, "it is not copied yet")
     assert "one" in robot.recorder.recordings
+
+
+def test_there_is_one_question_and_one_dialog_at_a_time(window: MonitorWindow) -> None:
+    """The window stays usable beside them, so that both can be asked for again."""
+    click(tab_of(window).delete)
+    first = until(lambda: window.recording.question, "a confirmation")
+    click(tab_of(window).delete)
+    until(lambda: window.recording.question not in (None, first), "the next one")
+    assert sum(box.isVisible() for box in window.findChildren(QMessageBox)) == 1
+    for _ in range(2):
+        window.recording.choose_folder()
+    (dialog,) = (each for each in window.findChildren(QFileDialog) if each.isVisible())
+    dialog.reject()
+    until(lambda: window.recording.folder_dialog is None, "it is answered")
+
+
+@pytest.mark.parametrize("exists", [True, False])
+def test_the_folder_of_exports_may_be_one_that_is_yet_to_be_made(
+    window: MonitorWindow, tmp_path: Path, exists: bool
+) -> None:
+    """Qt's refusal of one that does not exist is modal, and would keep the button STOP from working."""
+    folder = tmp_path / "exports"
+    if exists:
+        folder.mkdir()
+    window.recording.folder = folder
+    window.recording.choose_folder()
+    dialog = until(lambda: window.recording.folder_dialog, "the dialog")
+    assert not dialog.isModal()
+    window.recording.folder = tmp_path
+    dialog.accept()
+    until(lambda: window.recording.folder_dialog is None, "it is answered")
+    assert window.recording.folder == folder
 
 
 def test_everything_has_a_name_and_can_be_reached_by_keys(window: MonitorWindow) -> None:
