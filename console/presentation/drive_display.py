@@ -106,7 +106,7 @@ def own_display(
         ready: whether a hold would move the robot.
     """
     by = ", by line of sight" if supervision is Supervision.LINE_OF_SIGHT else ""
-    late = state_age_s > LATE_S
+    late, state_age_ms = state_age_s > LATE_S, round(state_age_s * _MS_PER_S)
     reason = rest_reasons(state.stop, state.inhibits, state.problems)
     if late:
         reason = f"the robot has not answered for {state_age_s:.1f} s"
@@ -117,9 +117,10 @@ def own_display(
         style=SeverityStyle.BAD if late else DRIVE_STYLES[state.phase],
         reason=". ".join(filter(None, (sentence(reason), step))),
         bars=tuple(_bars(state, limits, supervision)),
+        # Both as of the state: they grow while no newer one comes.
         ages=joined(
-            f"command {state.command_age_ms + round(state_age_s * _MS_PER_S)} ms",
-            "" if state.picture_age_ms is None else f"picture {state.picture_age_ms} ms",
+            f"command {state.command_age_ms + state_age_ms} ms",
+            "" if state.picture_age_ms is None else f"picture {state.picture_age_ms + state_age_ms} ms",
         ),
         stop=state.stop,
     )

@@ -50,8 +50,12 @@ def test_the_driver_sees_speeds_limits_and_ages() -> None:
         ("left", 0.0, 0.25, 0.25),
         ("turn", -0.4, 0.8, 0.8),
     ]
-    assert "command 32 ms" in shown.ages
-    assert "picture 118 ms" in shown.ages
+    assert shown.ages == "command 32 ms, picture 138 ms"
+
+
+def test_both_ages_grow_while_nothing_comes_from_the_robot() -> None:
+    shown = own_display(STATE, LIMITS, Supervision.PICTURE, state_age_s=1.5, ready=False)
+    assert shown.ages == "command 1512 ms, picture 1618 ms"
 
 
 def test_what_the_picture_or_the_line_of_sight_permits_is_less() -> None:
