@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 
 from omniseer.preview.v1 import preview_service_pb2 as pb
+from recorder.video.stream import STREAM_NOTE
 from tests.support.running_preview import RunningPreview
+from tests.support.tap_reader import TapRecording
 from tests.support.udp_link import Impairment, UdpLink
 from tests.support.undisturbed import without_stall
 from tests.support.watcher import Watcher
@@ -62,6 +64,40 @@ def test_a_bad_link_gets_less_and_a_good_one_more(tmp_path: Path) -> None:
                 assert "the link is quiet" in state.stream.bitrate_reason
                 assert state.counters.starts == 1
                 assert watcher.reconnects == 0
+
+    without_stall(attempt, tmp_path)
+
+
+def test_a_recording_keeps_its_floor_under_the_bit_rate_and_gives_it_up_with_its_end(tmp_path: Path) -> None:
+    floor_kbps = 400
+    """Above those of the profiles: 150 of balanced, 200 of high-quality."""
+
+    def held(actual: pb.ActualState) -> bool:
+        stream = actual.stream
+        words = f"at the floor of {floor_kbps} kbit/s"
+        return stream.target_bitrate_kbps == floor_kbps and words in stream.bitrate_reason
+
+    def attempt(directory: Path) -> None:
+        tap = directory / "tap.sock"
+        settings = {"video_tap": {"socket": str(tap), "floor_kbps": floor_kbps}}
+        with (
+            RunningPreview(directory, settings) as preview,
+            UdpLink(preview.port) as link,
+            Watcher(link.port) as watcher,
+        ):
+            preview.enable()
+            preview.running()
+            watcher.wait_for_frames(30)
+            with TapRecording(tap) as recording, preview.watching(120.0) as next_state:
+                recording.wait_for_frames(10)
+                link.impairment.loss = 0.4
+                next_state(held, "the recording's floor")
+                preview.enable(pb.PROFILE_HIGH_QUALITY)
+                next_state(lambda a: a.stream.target_bitrate_kbps > floor_kbps, "the start of the profile")
+                next_state(held, "the recording's floor, in another profile")
+            noted = [each.values for each in recording.notes(STREAM_NOTE)]
+            assert min(int(each["bitrate_kbps"]) for each in noted if "bitrate_kbps" in each) == floor_kbps
+            preview.wait_for(lambda a: a.stream.target_bitrate_kbps < floor_kbps, "the profile's own floor")
 
     without_stall(attempt, tmp_path)
 
