@@ -66,12 +66,15 @@ REMARKS: Final[Mapping[tuple[str, ...], str]] = {
     ),
     ("video.age_narrow_fixed_worst_ms", "video.age_deep_fixed_worst_ms"): (
         "with a fixed bit rate above what the link carries, the pictures grow older until the viewer"
-        " connects anew, and the last one goes on ageing until the first new one has come through a queue"
-        " that is still full."
+        " connects anew: at 0.6 s, or where none gets through any more, 0.6 s and a round trip after the last"
+        " one. That one goes on ageing until the first new one has come through a queue that is still full."
     ),
     ("video.age_changing_freeze_ms", "video.age_changing_reconnects"): (
-        "the link loses four fifths of its rate at once, in the middle of the stream. The queue is longer"
-        " than a second before the lower bit rate has an effect, and the viewer connects anew."
+        "the link loses four fifths of its rate at once, in the middle of the stream. Its queue of 0.2 s is"
+        " full and most packets are lost before the encoder sends less. 0.6 s and a round trip (0.2 s through"
+        " the full queue) after the last whole frame the viewer connects anew. Its handshake waits for a"
+        " quarter of a second behind what was sent to the old connection, and the key frame comes a tenth"
+        " later."
     ),
     ("soak.rss_growth_mib",): (
         "resident memory moves by tens of MiB with what libsrt holds for the last few seconds; the lowest"
