@@ -7,6 +7,7 @@ What runs for long (`follow`, `pull`, `serve`) outlives the sessions.
 | what happens | what follows |
 |---|---|
 | no server answers | every server once in random order, then a pause of 1 s to 60 s with jitter, for ever |
+| a server is silent | after 1 s the next one is tried beside it, and the first that answers is taken |
 | the hub does not accept the credentials | the same; `link.reason` is REFUSED |
 | the connection is half-open | found by pings within 15 s, then as lost |
 | the connection is lost | what waits for an answer fails with UNREACHABLE; at once on to the next server |
@@ -30,6 +31,7 @@ from fleet.consuming import Delivery
 from fleet.direct import Start, StoredMessage
 from fleet.errors import HubError, HubReason, RefusedError, UnreachableError, api_error, is_repeat
 from fleet.incoming import OPERATION
+from fleet.opening import first_to_open
 from fleet.present import present
 from fleet.replies import NO_RESPONDERS, Message, NotTaken, parsed
 from fleet.serving import Handler, Service, serve_in
@@ -392,25 +394,24 @@ class Hub:
 
     async def _try_servers(self) -> Session | None:
         """Tries every server once, in random order."""
-        address = self._address
-        servers = list(address.servers)
+        servers = list(self._address.servers)
         random.shuffle(servers)
-        worst: HubError = UnreachableError("no server of the hub is configured")
-        for server in servers:
-            try:
-                return await Session.open(
-                    server,
-                    credentials=address.credentials,
-                    ca=address.ca,
-                    inbox=address.inbox,
-                    name=address.name,
-                    not_taken=self.not_taken,
-                )
-            except HubError as error:
-                # One that refuses says more than one that is silent.
-                worst = worst if worst.reason is HubReason.REFUSED else error
-        self._set(False, "", worst)
-        return None
+        try:
+            return await first_to_open(servers, self._open_session)
+        except HubError as error:
+            self._set(False, "", error)
+            return None
+
+    async def _open_session(self, server: str) -> Session:
+        address = self._address
+        return await Session.open(
+            server,
+            credentials=address.credentials,
+            ca=address.ca,
+            inbox=address.inbox,
+            name=address.name,
+            not_taken=self.not_taken,
+        )
 
     async def _use(self, session: Session) -> None:
         try:

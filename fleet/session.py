@@ -11,7 +11,7 @@ import base64
 import json
 import ssl
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
-from contextlib import asynccontextmanager, contextmanager
+from contextlib import asynccontextmanager, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import ParseResult
@@ -65,10 +65,15 @@ class _Transport(TcpTransport):
     """
 
     _held = b""
+    _tcp: asyncio.WriteTransport | None = None
 
     def __bool__(self) -> bool:
         # The client makes a transport of its own in the place of a false one.
         return True
+
+    async def connect(self, uri: ParseResult, buffer_size: int, connect_timeout: int) -> None:
+        await super().connect(uri, buffer_size, connect_timeout)
+        self._tcp = self._writer().transport
 
     def write(self, payload: bytes) -> None:
         if payload.startswith(b"CONNECT "):
@@ -86,13 +91,21 @@ class _Transport(TcpTransport):
     ) -> None:
         # As the streams of asyncio do it; by hand, each end of a connection would be a warning in the log.
         host = uri if isinstance(uri, str) else uri.hostname
-        async with asyncio.timeout(connect_timeout):
-            await self._writer().start_tls(ssl_context, server_hostname=host)
+        try:
+            async with asyncio.timeout(connect_timeout):
+                await self._writer().start_tls(ssl_context, server_hostname=host)
+        except BaseException:
+            # asyncio does not report the end of a connection that ends within the handshake: `wait_closed`
+            # would wait for it until its time-out.
+            self.abort()
+            self._io_writer = None
+            raise
 
     def abort(self) -> None:
         """Closes the connection at once: a server that reads nothing would keep it open."""
-        if self._io_writer is not None:
-            self._io_writer.transport.abort()
+        # TLS above it can't be ended like that once it has been closed from both ends.
+        if self._tcp is not None:
+            self._tcp.abort()
 
     def _writer(self) -> asyncio.StreamWriter:
         if self._io_writer is None:
@@ -115,13 +128,13 @@ class _Client(Client):
     async def _process_op_err(self, e: Exception) -> None:
         # What waits to be sent is lost with the connection. The library would try to send it when it closes,
         # fail at that, and end half-way: without a word, with its tasks and its socket left behind.
-        self._pending.clear()
-        self._pending_data_size = 0
         self.abort()
         await super()._process_op_err(e)
 
     def abort(self) -> None:
         """Closes the connection without what waits to be sent."""
+        self._pending.clear()
+        self._pending_data_size = 0
         self._own_transport.abort()
 
     async def _flush_pending(self, force_flush: bool = False) -> Any:
@@ -276,6 +289,8 @@ class Session:
             await _close(client)
             raise _connect_error(server, errors[-1] if errors else error) from error
         except asyncio.CancelledError:
+            # A silent server would be waited for until the time-out of the end of TLS.
+            client.abort()
             await _close(client)
             raise
         return session
@@ -497,7 +512,8 @@ def _repeat_cancellation() -> None:
 
 async def _close(client: _Client) -> None:
     try:
-        await within(CONNECT_TIMEOUT_S, client.close())
-    except (TimeoutError, OSError, nats_errors.Error):
+        with suppress(TimeoutError, OSError, nats_errors.Error):
+            await within(CONNECT_TIMEOUT_S, client.close())
+    finally:
         # The socket of a server that does not take what is left would stay open.
         client.abort()

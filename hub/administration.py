@@ -5,6 +5,7 @@
 | the hub is unreachable during `enroll` | the robot's files are not written; repeat it |
 | `enroll` for an enrolled robot | refused, unless `again`: then new keys, and the old ones are revoked |
 | a server is down during `revoke` | the others refuse the robot at once, it within 15 s of its start |
+| a server is silent | another one is tried beside it after 1 s; what it led, until there is a leader again |
 | a hub of an earlier version is administered | all but `apply` is refused, which moves its people first |
 | nothing of the hub answers during `revoke` | the revocation is in the directory; `apply` repeats it |
 | a server loses its disk | it knows the revocations of its nats.conf, and all after `apply` |
@@ -13,9 +14,10 @@
 import asyncio
 import json
 import time
-from collections.abc import AsyncGenerator, Callable, Sequence
+from collections.abc import AsyncGenerator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -31,9 +33,12 @@ from hub.accounts import account_keys, account_tokens, add_accounts
 from hub.directory import HubDirectory, HubRecord, KeyName, Kind, User, check_name
 
 _CONNECT_S: Final = 5.0
+"""For a connection with one of the servers; a silent one is no reason to wait (fleet/opening.py)."""
 _PUSH_WITHIN_S: Final = 3.0
 _ELECTED_WITHIN_S: Final = 15.0
 """A cluster that lost a server has a leader again by then (docs/fleet.md)."""
+_ELECTING: Final = (HubReason.NO_RESPONDERS, HubReason.NO_QUORUM, HubReason.TIMEOUT)
+"""What the hub answers meanwhile; nothing, while the lost server counts as the leader."""
 
 
 def move_people(directory: HubDirectory, name: Callable[[User], None]) -> None:
@@ -85,7 +90,7 @@ async def apply(directory: HubDirectory, limits: streams.StreamLimits | None = N
         for user in record.users:
             if user.kind == "robot":
                 if not user.revoked:
-                    await streams.add_command_consumer(hub, user.name)
+                    await _once_elected(partial(streams.add_command_consumer, hub, user.name))
                 await _list_robot(hub, user)
     return differences
 
@@ -112,7 +117,7 @@ async def enroll(
         user = record.user("robot", robot)
         assert user is not None  # noqa: S101  # it has just been issued
         async with _connected(directory) as hub:
-            await streams.add_command_consumer(hub, robot)
+            await _once_elected(partial(streams.add_command_consumer, hub, robot))
             await _list_robot(hub, user)
         # First: a key that exists and is not listed could never be revoked.
         directory.write(record)
@@ -321,18 +326,23 @@ async def _push_accounts(directory: HubDirectory, record: HubRecord) -> None:
 
 
 async def _list_robot(hub: Hub, user: User) -> None:
-    """Puts a robot into the bucket that consoles read; while that elects its leader, tries again.
+    """Puts a robot into the bucket that consoles read; raises a HubError, as `_once_elected`."""
+    entry = {"robot": user.name, "revoked": user.revoked is not None, "revoked_unix_s": user.revoked}
+    await _once_elected(partial(hub.put, names.ROBOTS, user.name, json.dumps(entry).encode()))
+
+
+async def _once_elected(work: Callable[[], Awaitable[None]]) -> None:
+    """Does what may be done twice; while the hub elects a leader for it, tries again.
 
     Raises:
-        HubError: nothing took it for _ELECTED_WITHIN_S.
+        HubError: it does something else, or has elected none for _ELECTED_WITHIN_S.
     """
-    entry = {"robot": user.name, "revoked": user.revoked is not None, "revoked_unix_s": user.revoked}
     retry, deadline_s = Backoff(0.1, 1.0), time.monotonic() + _ELECTED_WITHIN_S
     while True:
         try:
-            await hub.put(names.ROBOTS, user.name, json.dumps(entry).encode())
+            await work()
         except HubError as error:
-            if error.reason is not HubReason.NO_RESPONDERS or time.monotonic() > deadline_s:
+            if error.reason not in _ELECTING or time.monotonic() > deadline_s:
                 raise
             await asyncio.sleep(retry.next_s())
         else:

@@ -166,7 +166,7 @@ async def add_command_consumer(hub: Hub, robot: str) -> None:
 async def _make_with_quorum(
     hub: Hub, name: str, config: dict[str, Any], chosen: Mapping[str, int], deadline_s: float
 ) -> list[str]:
-    """As `_make`, again and again for as long as nodes are missing, up to a time of the event loop."""
+    """As `_make`, again and again while nodes or the leader are missing, up to a time of the event loop."""
     backoff = Backoff(first_s=0.1, longest_s=2.0)
     while True:
         try:
@@ -174,7 +174,7 @@ async def _make_with_quorum(
         except HubError as error:
             pause_s = backoff.next_s()
             late = asyncio.get_running_loop().time() + pause_s > deadline_s
-            if error.reason is not HubReason.NO_QUORUM or late:
+            if error.reason not in (HubReason.NO_QUORUM, HubReason.TIMEOUT) or late:
                 raise
         await asyncio.sleep(pause_s)
 

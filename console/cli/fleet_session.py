@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 HUB_VARIABLE: Final = "ROBOTCTL_HUB"
 ANSWERS_WITHIN_S: Final = 5.0
-"""For a connection with one of the hub's servers."""
+"""For a connection with one of the hub's servers; a silent one is no reason to wait (fleet/opening.py)."""
 _INSTALL: Final = "Type, in a clone of the project: scripts/install-console"
 _NOT_SET_UP: Final = "The hub's administrator types: robot-bridge hub apply"
 _REMEDIES: Final = {
@@ -82,16 +82,17 @@ class FleetSession:
         """
         # The extra `fleet` may not be installed: `with_fleet` has found out.
         from fleet.connection import FleetAddress, connect  # noqa: PLC0415
-        from fleet.errors import HubError  # noqa: PLC0415
+        from fleet.errors import HubError, UnreachableError  # noqa: PLC0415
 
         login = self.login
         address = FleetAddress(login.servers, login.credentials_file, login.ca_file, name="robotctl")
         try:
             async with connect(address) as hub:
                 # A hub whose servers have all been tried once is not waited for.
-                await hub.changed.wait_until(
+                if not await hub.changed.wait_until(
                     lambda: hub.link.connected or hub.link.reason is not None, ANSWERS_WITHIN_S
-                )
+                ):
+                    raise UnreachableError(f"the hub does not answer within {ANSWERS_WITHIN_S:g} s")
                 await hub.connected(0)
                 yield hub
         except HubError as error:

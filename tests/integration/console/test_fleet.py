@@ -41,6 +41,7 @@ from tests.support.free import free_tcp_port
 from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.nats_servers import nats_servers
 from tests.support.robotctl import ENDS_WITHIN_S, ROBOTCTL, environment, only_line, robotctl, robotctl_process
+from tests.support.silent_server import silent_server, tried_in_order
 from tests.support.terminal import terminal_with
 
 NEVER = set(CONTROL_CHARACTERS) - {"\n"}
@@ -433,6 +434,26 @@ def test_without_a_hub_it_ends_3_with_one_line() -> None:
         assert "can't be reached" in only_line(done.stderr)
     error = json.loads(only_line(robotctl("fleet", "list", "--hub", servers, "--json").stderr))["error"]
     assert (error["kind"], error["exit_code"]) == ("unreachable", 3)
+
+
+def test_a_silent_server_is_passed_over(shared_hub: FleetHub, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The defect: where it was tried first, the hub was said not to answer."""
+    tried_in_order(monkeypatch)
+    monkeypatch.setattr("console.cli.fleet_session.ANSWERS_WITHIN_S", 30.0)
+    with silent_server() as silent:
+        done = robotctl("fleet", "list", "--hub", f"{silent},{shared_hub.urls}", "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "lab1" in [row["robot"] for row in json.loads(done.stdout)["robots"]]
+
+
+def test_where_every_server_is_silent_it_says_for_how_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The defect: "within 0 s"."""
+    tried_in_order(monkeypatch)
+    monkeypatch.setattr("console.cli.fleet_session.ANSWERS_WITHIN_S", 0.5)
+    with silent_server() as silent:
+        done = robotctl("fleet", "list", "--hub", silent)
+    assert done.returncode == 3
+    assert "the hub does not answer within 0.5 s" in only_line(done.stderr)
 
 
 def test_a_hub_that_is_not_set_up(tmp_path: Path) -> None:

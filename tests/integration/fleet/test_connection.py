@@ -18,6 +18,8 @@ from fleet.session import Session
 from hub import streams
 from tests.support.free import free_tcp_port
 from tests.support.nats_servers import NatsServers, nats_servers
+from tests.support.secure_hub import SecureHub
+from tests.support.silent_server import silent_server, tried_in_order
 
 _FOUND_WITHIN_S = 15.0
 """docs/fleet.md: a half-open connection."""
@@ -47,6 +49,49 @@ async def test_without_a_server_calls_fail_at_once() -> None:
         with pytest.raises(UnreachableError, match="can't be reached"):
             await hub.connected(1.0)
         assert hub.link.reason is HubReason.UNREACHABLE
+
+
+async def test_a_silent_server_keeps_no_caller_from_another_one(
+    servers: NatsServers, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The defect: they were tried one after the other, and callers waited no longer than for the first."""
+    tried_in_order(monkeypatch)
+    with silent_server() as silent, silent_server() as other:
+        async with connect(FleetAddress((silent, other, *servers.urls))) as hub:
+            await hub.connected(30)
+            assert hub.link.server == servers.urls[0]
+            await hub.publish_once("fleet.r1.ev.run.1", b"")
+
+
+async def test_an_attempt_at_a_server_that_falls_silent_within_tls_ends_when_it_is_cancelled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Or the session with the server that did answer would wait for it."""
+    tried_in_order(monkeypatch)
+    ca = SecureHub(tmp_path).directory.ca_file
+    greeted = asyncio.Event()
+
+    async def greet(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.write(b'INFO {"max_payload":1000,"headers":true,"tls_required":true}\r\n')
+        # The first message of TLS.
+        await reader.read(65536)
+        greeted.set()
+        try:
+            while await reader.read(65536):
+                pass
+        except ConnectionError:
+            return
+        finally:
+            writer.close()
+
+    async with await asyncio.start_server(greet, "127.0.0.1", 0) as server:
+        url = f"tls://127.0.0.1:{server.sockets[0].getsockname()[1]}"
+        opening = asyncio.create_task(Session.open(url, credentials=None, ca=ca, inbox="_INBOX.x", name=""))
+        async with asyncio.timeout(20):
+            await greeted.wait()
+        opening.cancel()
+        ended, _ = await asyncio.wait({opening}, timeout=20)
+        assert ended
 
 
 async def test_a_restart_of_the_server_is_survived(servers: NatsServers) -> None:

@@ -1,4 +1,4 @@
-"""Making the hub's streams while its nodes are still joining."""
+"""Making the hub's streams while its nodes are still joining, or elect a leader."""
 
 from typing import Any
 
@@ -42,6 +42,12 @@ async def test_nodes_that_are_still_joining_are_waited_for() -> None:
     assert await made_by(hub) == []
     created = [call.removeprefix("STREAM.CREATE.") for call in hub.calls if "CREATE" in call]
     assert created == list(streams.stream_configs(3))
+
+
+async def test_a_leader_that_answers_nothing_is_waited_for() -> None:
+    """A node that stands still counts as the leader until the others have elected another one."""
+    hub = _Joining([HubError(HubReason.TIMEOUT, "no answer from the hub within 5 s")])
+    assert await made_by(hub) == []
 
 
 async def test_but_not_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
