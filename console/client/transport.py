@@ -189,9 +189,11 @@ class Responses:
             error = failure
         except asyncio.CancelledError:
             call.cancel()
-            # gRPC raises it, too, when the channel was closed under the call.
             if self._task.cancelling():
-                raise
+                # Not raised: the task would keep the traceback and, with it, the call, whose connection would
+                # stay open until Python's collector comes.
+                return
+            # gRPC raises it, too, when the channel was closed under the call.
             error = Cancelled("this client was closed")
         # Behind the items that wait to be read.
         await self._queue.put(error)
