@@ -139,7 +139,10 @@ def rows(ground: Ground, wanted: set[str]) -> list[Row]:
 
 
 def stopped_ms(ground: Ground, fault: _Fault) -> float:
-    """Returns how long the base moves after a fault, in ms."""
+    """Returns how long the base moves after a fault, in ms.
+
+    The last command before it may be 20 ms older (docs/driving.md).
+    """
     with ground.robot() as robot:
         match fault.over:
             case "nothing":

@@ -55,7 +55,10 @@ async def stopped_after_s(
     fault: Callable[[int], object],
     recovery: Callable[[int], object] = lambda _: None,
 ) -> float:
-    """How long the base moves after a fault, also if the fault ends; both get the driver's process ID."""
+    """How long the base moves after a fault, also if the fault ends; both get the driver's process ID.
+
+    The last command before it may be 20 ms older: tests/integration/drive/test_stopping.py begins with that.
+    """
     await free(robot)
     with module_program("tests.support.driver_program", target, says="driving") as process:
         with moving(robot.base, robot.drive):
