@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Final
 
 from common.private_files import sync_directory
-from gateway.status.event import ControlAction
+from gateway.status.event import ControlAction, Motion
 
 _log = logging.getLogger(__name__)
 
@@ -134,9 +134,10 @@ class AuditLog:
 def line_of(action: ControlAction) -> str:
     """Returns a JSON object in one line of ASCII, whatever the caller sent.
 
-    Several actions have their number in it, and the times of the first ones.
+    Several actions have their number in it, and the times of the first ones; several times of motion also how
+    long and how far each of those was, and the newest.
     """
-    fields: dict[str, str | int | list[str]] = {
+    fields: dict[str, str | int | list[str] | list[dict[str, float]]] = {
         "time": _timestamp(action.unix_s),
         "who": action.who,
         "role": action.role,
@@ -150,7 +151,18 @@ def line_of(action: ControlAction) -> str:
     }
     if action.count > 1:
         fields |= {"count": action.count, "times": [_timestamp(each) for each in action.earlier_unix_s]}
+    if action.motions:
+        fields["motions"] = [_measures(each) for each in action.motions]
     return json.dumps(fields, ensure_ascii=True) + "\n"
+
+
+def _measures(motion: Motion) -> dict[str, float]:
+    """Returns its figures to the millisecond, millimetre and thousandth of a radian."""
+    return {
+        "duration_s": round(motion.duration_s, 3),
+        "distance_m": round(motion.distance_m, 3),
+        "turned_rad": round(motion.turned_rad, 3),
+    }
 
 
 def _timestamp(unix_s: float) -> str:

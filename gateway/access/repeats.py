@@ -23,8 +23,8 @@ MAX_CALLERS: Final = 64
 """Callers, beyond which new addresses share the bucket and folds of one. None is dropped to make room: that
 would refill its bucket. Names always have their own: there are as many as the robot has credentials."""
 MAX_TIMES: Final = 16
-"""Actions of a fold whose times are kept, besides the newest: from them follows the order in which a caller
-alternated between several, unless it did so more often than a person would."""
+"""Actions of a fold whose times are kept, and what each has moved, besides the newest: from them follows the
+order in which a caller alternated between several, unless it did so more often than a person would."""
 _OVERFLOW: Final = ""
 """The caller that stands for all addresses beyond MAX_CALLERS."""
 _TEXTS: Final = ("who", "address", "method", "request", "answer", "role", "credential")
@@ -127,14 +127,20 @@ class Repeats:
 
 
 def _combined(older: ControlAction, newer: ControlAction) -> ControlAction:
-    """Returns the newer action with the count of both; where their texts differ, it says so."""
+    """Returns the newer action with the count of both; where their texts differ, it says so.
+
+    Args:
+        older: one action, or those that were combined so far.
+        newer: one action.
+    """
     differing: dict[str, Any] = {
         name: f"{getattr(newer, name)}{_AND_OTHERS}"
         for name in _TEXTS
         if getattr(older, name) != getattr(newer, name)
     }
-    motion = older.motion.and_then(newer.motion) if older.motion and newer.motion else None
-    if motion:
-        differing["request"] = str(motion)
+    if older.motion and newer.motion:
+        motion = older.motion.and_then(newer.motion)
+        earlier = (older.motions or (older.motion,))[:MAX_TIMES]
+        differing |= {"request": str(motion), "motion": motion, "motions": (*earlier, newer.motion)}
     earlier_unix_s = (*older.earlier_unix_s, older.unix_s)[:MAX_TIMES]
-    return replace(newer, count=older.count + 1, earlier_unix_s=earlier_unix_s, motion=motion, **differing)
+    return replace(newer, count=older.count + 1, earlier_unix_s=earlier_unix_s, **differing)

@@ -122,6 +122,8 @@ class ControlAction:
         count: how many actions this one stands for; the newest of them is described.
         earlier_unix_s: when the first of the others ended, oldest first; not more than a few.
         motion: of a time of motion, all of those that it stands for; `request` says the same.
+        motions: where it stands for several times of motion, each of those that ended at `earlier_unix_s`,
+            and the newest.
     """
 
     who: str
@@ -137,6 +139,7 @@ class ControlAction:
     count: int = 1
     earlier_unix_s: tuple[float, ...] = field(default=(), compare=False)
     motion: Motion | None = field(default=None, compare=False)
+    motions: tuple[Motion, ...] = field(default=(), compare=False)
 
 
 @dataclass(frozen=True, slots=True)

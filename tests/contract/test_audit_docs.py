@@ -20,6 +20,7 @@ AUDIT = AuditSettings()
         f"{MAX_KINDS} kinds per caller are distinguished",
         f"recorded at most {WINDOW_S:.0f} s later",
         f"`times` has the first {MAX_TIMES} and `time` the last",
+        f"`motions` has the first {MAX_TIMES} of them and the last one",
         f"more than {MAX_TIMES + 1} calls of each in a minute",
         f"loses the actions of the last {WINDOW_S:.0f} s that were only counted",
         f"{MAX_CALLERS} callers have a bucket each",

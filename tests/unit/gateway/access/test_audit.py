@@ -10,7 +10,7 @@ import pytest
 
 from gateway.access import audit
 from gateway.access.audit import AuditLog
-from gateway.status.event import ControlAction, ControlResult
+from gateway.status.event import ControlAction, ControlResult, Motion
 from tests.support.waiting import wait_until
 
 
@@ -51,6 +51,20 @@ def test_a_line_that_stands_for_several_has_their_number_and_times(tmp_path: Pat
     assert one.keys() & {"count", "times"} == set()
     assert (several["time"], several["count"]) == ("1970-01-01T00:01:02.250+00:00", 7000)
     assert several["times"] == ["1970-01-01T00:00:02.500+00:00", "1970-01-01T00:00:03.000+00:00"]
+
+
+def test_a_line_that_stands_for_several_motions_has_each_of_them(tmp_path: Path) -> None:
+    log = AuditLog(tmp_path / "a", 1 << 20, 2)
+    motions = (Motion(0.3004, 0.0451, 0.1, "keyboard"), Motion(2.0, 0.4, 0.0, "keyboard"))
+    with log.writing():
+        log.record(replace(action(0), motion=motions[0]))
+        log.record(replace(action(0), count=2, earlier_unix_s=(2.5,), motions=motions))
+    one, several = [json.loads(line) for line in (tmp_path / "a").read_text().splitlines()]
+    assert "motions" not in one
+    assert several["motions"] == [
+        {"duration_s": 0.3, "distance_m": 0.045, "turned_rad": 0.1},
+        {"duration_s": 2.0, "distance_m": 0.4, "turned_rad": 0.0},
+    ]
 
 
 def test_lines_survive_a_power_loss(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from gateway.access.audit import AuditLog
 from gateway.access.repeats import BURST, MAX_CALLERS, MAX_KINDS, MAX_TIMES, WINDOW_S, Repeats
 from gateway.config import AuditSettings
-from gateway.status.event import ControlAction, ControlResult
+from gateway.status.event import ControlAction, ControlResult, Motion
 
 TICK_S = 0.2
 
@@ -114,6 +114,34 @@ def test_a_fold_describes_the_newest_and_has_the_first_times() -> None:
     assert (fold.count, fold.request_id, fold.unix_s) == (MAX_TIMES + 4, str(MAX_TIMES + 3), 119.0)
     assert fold.earlier_unix_s == tuple(100.0 + number for number in range(MAX_TIMES))
     assert (fold.who, fold.address, fold.result) == ("anna", "10.0.0.5:4", ControlResult.ACCEPTED)
+
+
+def motion(number: int) -> Motion:
+    return Motion(duration_s=number / 10, distance_m=number / 100, turned_rad=0.0, device="keyboard")
+
+
+def test_a_fold_of_motions_has_each_of_the_first_and_the_newest_and_the_sum_of_all() -> None:
+    ground = Ground()
+    ground.take(replace(action("", who="anna"), motion=motion(0)), BURST)
+    assert [record.motions for record in ground.records] == [()] * BURST
+    ground.records.clear()
+    held = [motion(number) for number in range(1, MAX_TIMES + 5)]
+    for each in held:
+        ground.take(replace(action(str(each)), motion=each, unix_s=100.0 + each.duration_s))
+    ground.wait(WINDOW_S)
+    [fold] = ground.records
+    assert fold.motions == (*held[:MAX_TIMES], held[-1])
+    assert fold.earlier_unix_s == tuple(100.0 + each.duration_s for each in held[:MAX_TIMES])
+    assert fold.request.startswith(f"{sum(each.duration_s for each in held):.1f} s, ")
+
+
+def test_a_fold_of_two_motions_has_both() -> None:
+    ground = Ground()
+    ground.take(replace(action(""), motion=motion(0)), BURST)
+    for number in (1, 2):
+        ground.take(replace(action(""), motion=motion(number)))
+    ground.wait(WINDOW_S)
+    assert ground.records[-1].motions == (motion(1), motion(2))
 
 
 def test_other_answers_addresses_and_credentials_are_no_repeats() -> None:

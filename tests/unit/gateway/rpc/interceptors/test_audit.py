@@ -12,12 +12,12 @@ from common.errors import InvalidRequestError, NotAllowedError, NotAuthenticated
 from common.interceptors import Interceptor
 from common.reasons import Reason
 from gateway.access.credential import Principal
-from gateway.access.repeats import BURST, MAX_KINDS, WINDOW_S
+from gateway.access.repeats import BURST, MAX_KINDS, MAX_TIMES, WINDOW_S
 from gateway.access.role import Role
 from gateway.rpc.calls.call import CallContext
 from gateway.rpc.interceptors.audit import Audit, AuditStart
 from gateway.rpc.interceptors.validation import Validation
-from gateway.status.event import ControlAction, ControlResult, Event
+from gateway.status.event import ControlAction, ControlResult, Event, Motion
 from gateway.status.event_log import CAPACITY
 from gateway.status.fault import Severity
 from gateway.status.teleop import DriveEpisode
@@ -371,6 +371,7 @@ def test_holds_without_end_are_folded_and_keep_what_was_moved() -> None:
     assert (fold.who, fold.answer, fold.credential) == ("anna", "released", "cafe01")
     assert fold.count == 3599 - BURST
     assert fold.request == f"{0.1 * fold.count:.1f} s, {0.01 * fold.count:.2f} m, 20563 deg, by gamepad"
+    assert fold.motions == (Motion(0.1, 0.01, 0.1, "gamepad"),) * (MAX_TIMES + 1)
 
 
 def test_motions_take_no_record_of_calls() -> None:
