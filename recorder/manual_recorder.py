@@ -77,19 +77,27 @@ class ManualRecorder:
         self.running: Manifest | None = None
         self.newest_id = ""
 
-    async def open(self, manifest: Manifest, closed: Callable[[Output, Closed], None]) -> None:
+    async def open(
+        self,
+        manifest: Manifest,
+        closed: Callable[[Output, Closed], None],
+        *,
+        after: Gap | None = None,
+    ) -> None:
         """Opens the first, or the next, segment of a recording; a failure ends in FAULTED.
 
         Args:
             manifest: of the recording.
             closed: called, by the writer's thread, with each segment that has become final.
+            after: the manifest's gap for the interruption before it, which its next file has as well; None if
+                there was none.
         """
         self.running = manifest
         self.newest_id = manifest.id
         self._lifecycle.stopped_by_disk = False
         try:
             shape = await asyncio.to_thread(self._prepared, manifest)
-            output = Output(shape, self._writer.head, closed)
+            output = Output(shape, self._writer.head, closed, after=after)
             await asyncio.wrap_future(self._writer.add(output))
         except OSError as error:
             await self.fail(error)

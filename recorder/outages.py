@@ -23,9 +23,9 @@ class Outages:
         return bool(self._present or self._past)
 
     @property
-    def lasts(self) -> bool:
-        """Whether there is one at present."""
-        return self._present is not None
+    def present(self) -> Gap | None:
+        """The one that lasts, from when on; None if there is none."""
+        return self._present
 
     def begin(self, cause: GapCause, at_ns: int) -> None:
         """Takes note that nothing is written from an instant on; one that lasts already goes on."""

@@ -173,7 +173,8 @@ class Recorder:
             await self._manual.make_whole(manifest.model_copy(update={"state": RecordingState.RECOVERED}))
             return
         self._lifecycle.move(Event.START)
-        await self._manual.open(with_interruption(manifest, time.time_ns()), self._parts.reports.closed)
+        interrupted = with_interruption(manifest, time.time_ns())
+        await self._manual.open(interrupted, self._parts.reports.closed, after=interrupted.gaps[-1])
 
     async def _rest(self, ends: "asyncio.Task[Literal[True]]") -> None:
         """Returns when there is something to do."""

@@ -156,9 +156,10 @@ class RingRecorder:
             # A former process has left it.
             self._outages.add(self._ring.losses())
             self._outages.begin(GapCause.INTERRUPTED, self._ring.newest_ns)
-        if self._outages.lasts:
+        outage = self._outages.present
+        if outage:
             self._ring.skip()
-        output = Output(self.shape(), self._writer.head, closed)
+        output = Output(self.shape(), self._writer.head, closed, after=outage)
         await asyncio.wrap_future(self._writer.add(output))
         self._outputs.ring = output
         self._outages.end(time.time_ns())

@@ -209,9 +209,16 @@ class Manifest(_Part):
 
     @property
     def _gaps(self) -> Iterator[Gap]:
+        """Yields each gap once: an interruption is in the segment that follows it, too, which may be older.
+
+        A segment of the ring may have one that ended before what a snapshot is to contain.
+        """
         yield from self.gaps
-        for segment in self.segments:
-            yield from segment.gaps
+        from_ns = self.window_ns[0] if self.window_ns else 0
+        known = [each for each in self.gaps if _is_of_all(each)]
+        for gap in (each for segment in self.segments for each in segment.gaps):
+            if not (_is_of_all(gap) and (gap.ended_ns <= from_ns or any(_meet(gap, each) for each in known))):
+                yield gap
 
     @property
     def sha256(self) -> bytes:
@@ -325,6 +332,16 @@ class Manifest(_Part):
             OSError: the disk is full or fails; the former one is as it was.
         """
         replace_file(folder / MANIFEST, self.model_dump_json(indent=1, exclude_defaults=True).encode())
+
+
+def _is_of_all(gap: Gap) -> bool:
+    """Returns whether a gap is of all channels, and of unknown size: as what an interruption has cost."""
+    causes = (GapCause.INTERRUPTED, GapCause.DISK)
+    return gap.cause in causes and not gap.topic and gap.messages is None
+
+
+def _meet(gap: Gap, other: Gap) -> bool:
+    return gap.began_ns <= other.ended_ns and other.began_ns <= gap.ended_ns
 
 
 class DamagedManifestError(Exception):

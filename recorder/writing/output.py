@@ -8,7 +8,7 @@ from typing import Final
 
 from recorder.mcap.records import PART
 from recorder.mcap.writer import SegmentWriter
-from recorder.values import VIDEO_TOPIC, Channel, Item, Loss, Losses, Note, Sample, SegmentSummary
+from recorder.values import VIDEO_TOPIC, Channel, Gap, Item, Loss, Losses, Note, Sample, SegmentSummary
 
 CLOCK_STEP_NS: Final = 500_000_000
 """A calendar clock that steps by more than this begins a new segment."""
@@ -94,6 +94,8 @@ class Output:
         shape: what it takes.
         head: returns what every segment begins with.
         closed: called with each segment that has become final.
+        after: the interruption before it; lasts until its first message, with which the file says it. None if
+            there was none. It is no loss of this output.
 
     Attributes:
         progress: as of the newest flush; replaced as a whole, for other threads.
@@ -104,11 +106,14 @@ class Output:
         shape: Shape,
         head: Callable[[], Head],
         closed: Callable[["Output", Closed], None],
+        *,
+        after: Gap | None = None,
     ) -> None:
         self.shape = shape
         self.progress = Progress()
         self._head = head
         self._closed = closed
+        self._after = after
         self._number = shape.first
         self._segment: SegmentWriter | None = None
         self._path = Path()
@@ -225,6 +230,10 @@ class Output:
         elif segment.size - self._head_bytes >= self.shape.max_bytes:
             self.rotate()
             segment = self._opened
+        if self._after:
+            gap, self._after = self._after, None
+            ended_ns = max(gap.ended_ns, sample.log_time_ns)
+            segment.loss(Loss(None, gap.cause, gap.began_ns, ended_ns, gap.messages))
         segment.write(sample)
         self._fresh = False
         self._messages += 1
