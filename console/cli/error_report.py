@@ -6,6 +6,7 @@ from typing import Any
 
 from common.errors import ExitCode, UserError
 from common.printable import escaped
+from console.cli.refusal_commands import COMMANDS
 from console.cli.typed_options import typed_options
 
 
@@ -15,7 +16,7 @@ def error_as_json(error: UserError) -> dict[str, Any]:
     return {
         "kind": error.kind or own,
         "what": " ".join(error.what.split()),
-        "remedy": typed_options(sys.argv[1:]).repeated_in(error.remedy),
+        "remedy": typed_options(sys.argv[1:]).repeated_in(_remedy(error)),
         "exit_code": int(error.exit_code),
     }
 
@@ -25,4 +26,10 @@ def report(error: UserError) -> None:
     if "--json" in sys.argv[1:]:
         print(escaped(json.dumps({"error": error_as_json(error)}, ensure_ascii=False)), file=sys.stderr)
     else:
-        print(f"error: {typed_options(sys.argv[1:]).repeated_in(str(error))}", file=sys.stderr)
+        text = str(UserError(error.what, _remedy(error)))
+        print(f"error: {typed_options(sys.argv[1:]).repeated_in(text)}", file=sys.stderr)
+
+
+def _remedy(error: UserError) -> str:
+    # Only refusals of a gateway have a reason; importing their class would take long.
+    return COMMANDS.get(getattr(error, "reason", ""), error.remedy)

@@ -90,14 +90,14 @@ _ADVICE: Final[Mapping[str, str]] = {
     Reason.CREDENTIAL_UNKNOWN: _NEW_LOGIN,
     Reason.CREDENTIAL_REVOKED: _NEW_LOGIN,
     Reason.CREDENTIAL_EXPIRED: _NEW_LOGIN,
-    Reason.TELEOP_DISABLED: "Type: robotctl drive --enable",
-    Reason.LEASE_HELD: "Type: robotctl drive --take-over",
+    Reason.TELEOP_DISABLED: "Enable driving first",
+    Reason.LEASE_HELD: "Wait, or take over",
     Reason.RECORDING_NOT_CONFIGURED: "Ask this robot's administrator to set it up; see docs/recording.md",
     Reason.RECORDER_UNREACHABLE: "Start or restart robot-recorder on the robot; what it records goes on",
     Reason.RECORDER_NOT_READY: "Type: robotctl status",
     Reason.RECORDING_NOT_FOUND: "Type: robotctl record list",
     Reason.RECORDING_RUNS: "Wait until it ends, or type: robotctl record stop",
-    Reason.NO_VIDEO: "Type: robotctl record start --no-video",
+    Reason.NO_VIDEO: "Record without the video",
     Reason.NO_RING: "Set `ring` in the recorder's configuration",
     Reason.DISK_FULL: "Copy recordings to this computer and delete them: robotctl record list",
     Reason.TOO_MANY_SNAPSHOTS: "Wait until they are complete: robotctl record list",
@@ -108,12 +108,8 @@ _ADVICE: Final[Mapping[str, str]] = {
     Reason.RECORDING_DELETED: "Type: robotctl record list",
     Reason.RECORDING_DAMAGED: "Check the robot's disk; the recording's other files may be intact",
     Reason.RECORDING_READ_ONLY: "Change it on the robot itself",
-    Reason.RECORDING_PINNED: (
-        "Type: robotctl record unpin ID; an administrator may type: robotctl record delete ID --force"
-    ),
-    Reason.RECORDING_NOT_COPIED: (
-        "Wait until it is copied, or as an administrator type: robotctl record delete ID --force"
-    ),
+    Reason.RECORDING_PINNED: "Unpin it, or as an administrator delete it with force",
+    Reason.RECORDING_NOT_COPIED: "Wait until it is copied, or as an administrator delete it with force",
     Reason.FLEET_NOT_CONFIGURED: "Ask this robot's administrator to set it up; see docs/fleet.md",
     Reason.BRIDGE_UNREACHABLE: "Start or restart robot-bridge on the robot; recordings stay there",
     Reason.UPLOAD_NOT_QUEUED: "Type: robotctl record list",
@@ -130,7 +126,8 @@ _ADVICE: Final[Mapping[str, str]] = {
         "robotctl login NAME HOST:PORT FILE --replace"
     ),
 }
-"""Where a reason allows more specific advice than the class."""
+"""Where a reason allows more specific advice than the class. Scripts and windows show it as well: what an
+argument of the library does has an option of robotctl, which console/cli/refusal_commands.py names."""
 
 _CLOSED: Final = "the connection was closed, as by a gateway that requires a login (robotctl login)"
 
