@@ -3,10 +3,13 @@
 from pathlib import Path
 
 import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
 from rosbags.rosbag2 import Reader
 
 from recorder.values import VIDEO_TOPIC
 from tests.support.gateway_program import gateway_program
+from tests.support.gst_judge import decoded_frames
 from tests.support.record_command import printed, record
 from tests.support.robotctl import only_line
 from tests.support.running_preview import RunningPreview
@@ -18,6 +21,18 @@ pytestmark = [pytest.mark.ros, pytest.mark.gst]
 TOPIC = "/odom"
 SENT = 200
 FRAMES = 30
+
+
+def exported_units(folder: Path) -> list[bytes]:
+    """The access units of a copy in their order, as an independent reader of MCAP and ROS 2 finds them."""
+    units: list[bytes] = []
+    for path in sorted(folder.glob("*.mcap")):
+        with path.open("rb") as file:
+            reader = make_reader(file, decoder_factories=[DecoderFactory()], validate_crcs=True)
+            for found in reader.iter_decoded_messages(topics=[VIDEO_TOPIC]):
+                assert found.decoded_message.format == "h264"
+                units.append(bytes(found.decoded_message.data))
+    return units
 
 
 @pytest.mark.usefixtures("ros_domain")
@@ -55,5 +70,7 @@ def test_a_recording_with_video_is_started_stopped_and_copied_by_robotctl(tmp_pa
             assert bag.topics[TOPIC].msgcount == SENT
             assert bag.topics[VIDEO_TOPIC].msgtype == "foxglove_msgs/msg/CompressedVideo"
             assert bag.topics[VIDEO_TOPIC].msgcount == stopped["video_frames"]
+        units = exported_units(copies / recording_id / "data")
+        assert decoded_frames(units) == len(units) == stopped["video_frames"], "by GStreamer"
         assert record(gateway, "delete", recording_id).returncode == 0
         assert printed(gateway, "list")["recordings"] == []
