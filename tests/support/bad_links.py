@@ -1,11 +1,14 @@
-"""Links that fail in ways a closed port does not: silence."""
+"""Links that fail in ways a closed port does not: silence, and delay."""
 
 import select
 import socket
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Self
+
+from tests.support.udp_link import Direction, Impairment, Line, next_arrival_in_s
 
 
 @contextmanager
@@ -28,9 +31,15 @@ def black_hole() -> Iterator[int]:
 
 
 class Relay:
-    """A TCP relay to a local port that can fall silent without closing anything, as bad Wi-Fi does."""
+    """A TCP relay to a local port that can fall silent without closing anything, as bad Wi-Fi does.
 
-    def __init__(self, port: int) -> None:
+    Args:
+        port: of the server.
+        delay_s: how much later bytes arrive, each way; an end of a connection does not wait.
+    """
+
+    def __init__(self, port: int, delay_s: float = 0.0) -> None:
+        self._on_their_way = Line[tuple[socket.socket, bytes]](Direction(Impairment(delay_s=delay_s), 1))
         self._to = ("127.0.0.1", port)
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port: int = self._listener.getsockname()[1]
@@ -80,7 +89,8 @@ class Relay:
         while not self._ended.is_set():
             held = self._servers if self._answers_held.is_set() else set()
             passing = [one for one in self._pairs if one not in held]
-            ready, _, _ = select.select([self._listener, self._wake_here, *passing], [], [])
+            wait_s = next_arrival_in_s(self._on_their_way)
+            ready, _, _ = select.select([self._listener, self._wake_here, *passing], [], [], wait_s)
             for one in ready:
                 if one is self._listener:
                     self._accept()
@@ -96,7 +106,10 @@ class Relay:
                             end.close()
                         self._pairs.clear()
                 elif one in self._pairs:
-                    self._pass_on(one)
+                    self._take(one)
+            for one, data in self._on_their_way.arrived(time.monotonic()):
+                if one in self._pairs:
+                    self._pass_on(one, data)
 
     def _accept(self) -> None:
         near, _ = self._listener.accept()
@@ -105,19 +118,29 @@ class Relay:
         except ConnectionRefusedError:
             near.close()
             return
+        for end in (near, far):
+            end.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._pairs[near], self._pairs[far] = far, near
         self._servers.add(far)
         self.connections += 1
 
-    def _pass_on(self, one: socket.socket) -> None:
-        other = self._pairs[one]
+    def _take(self, one: socket.socket) -> None:
         try:
             data = one.recv(65536)
-            if data:
-                other.sendall(data)
-                return
         except OSError:
-            pass  # A reset ends the pair as an orderly end does.
-        for end in (one, other):
+            data = b""  # A reset ends the pair as an orderly end does.
+        if data:
+            self._on_their_way.send(data, (self._pairs[one], data))
+        else:
+            self._end(one)
+
+    def _pass_on(self, one: socket.socket, data: bytes) -> None:
+        try:
+            one.sendall(data)
+        except OSError:
+            self._end(one)
+
+    def _end(self, one: socket.socket) -> None:
+        for end in (one, self._pairs.pop(one)):
             self._pairs.pop(end, None)
             end.close()

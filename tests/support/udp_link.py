@@ -39,6 +39,7 @@ class Impairment:
         queue_s: longest wait before the bottleneck; a packet that would wait longer is dropped.
         jitter_s: longest further delay, another one for each packet, so that packets overtake each other.
         duplicates: share of the packets that come twice, 0 to 1.
+        drops: how many of the next data packets are lost, whatever `loss` is; counts down.
     """
 
     loss: float = 0.0
@@ -48,6 +49,7 @@ class Impairment:
     queue_s: float = 0.2
     jitter_s: float = 0.0
     duplicates: float = 0.0
+    drops: int = 0
 
 
 class Direction:
@@ -72,8 +74,11 @@ class Direction:
             now_s: seconds on any clock that does not go back.
         """
         link = self._impairment
-        loss = link.control_loss if packet[:1] >= bytes([_CONTROL]) else link.loss
-        if self._random.random() < loss:
+        is_control = packet[:1] >= bytes([_CONTROL])
+        if link.drops > 0 and not is_control:
+            link.drops -= 1
+            return None
+        if self._random.random() < (link.control_loss if is_control else link.loss):
             return None
         begin_s = max(now_s, self._free_at_s)
         if link.rate_kbps is not None:

@@ -35,6 +35,13 @@ def test_control_packets_have_a_loss_of_their_own() -> None:
     assert not any(lost(Direction(Impairment(control_loss=1.0), 1), DATA))
 
 
+def test_a_number_of_data_packets_is_lost_once() -> None:
+    direction = Direction(link := Impairment(), 1)
+    link.drops = 2
+    assert not any(lost(direction, CONTROL, 10))
+    assert lost(direction, DATA, 10) == [True] * 2 + [False] * 8
+
+
 def test_packets_wait_before_the_bottleneck_until_its_queue_is_full() -> None:
     # 1000 bytes at 800 kbit/s take 10 ms each.
     direction = Direction(Impairment(rate_kbps=800, queue_s=0.035, delay_s=0.1), 1)
