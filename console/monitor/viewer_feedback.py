@@ -92,7 +92,8 @@ class ViewerFeedback:
         while self._known:
             await self._requested.wait()
             if not _take(bucket):
-                await asyncio.sleep(_REQUEST_EVERY_S)
+                # A ms more, so that the token is whole.
+                await asyncio.sleep((1 - bucket.tokens) * _REQUEST_EVERY_S + 0.001)
                 _take(bucket)
             self._requested.clear()
             await self._send_request(client)

@@ -26,8 +26,11 @@ _NARROW_PERCENT: Final = 20.0
 """Loss beyond what SRT repairs: the link is narrower than the stream."""
 _BUSY_S: Final = 0.1
 """Packets come while none is longer ago."""
-_REPEAT_S: Final = 0.5
-"""Without a key frame for that time, one is requested again."""
+_FIRST_REQUEST_S: Final = 0.5
+"""Without a key frame for that time at the beginning of a connection, one is requested."""
+_ANSWERED_S: Final = 0.1
+"""What a requested key frame takes besides the round trip: to the encoder's next frame, 67 ms at the slowest
+profile, and its coding."""
 _REJOIN_AFTER_S: Final = 0.2
 """The same where none can be requested: a new connection begins with one."""
 _FIRST_KEY_FRAME_S: Final = 2.5
@@ -48,6 +51,19 @@ def wait_s(rtt_ms: float) -> float:
     and a constant leave room for several attempts.
     """
     return min(max(_LEAST_WAIT_S, 0.15 + 5 * rtt_ms / 1000), _LONGEST_WAIT_S)
+
+
+def repeat_s(longest_wait_s: float, rtt_ms: float) -> float:
+    """Returns after how long without a key frame one is requested again, in seconds.
+
+    A part of the one that was requested may be missing, and is waited for. Until that is given up, the robot
+    would make another one for nothing.
+
+    Args:
+        longest_wait_s: for a missing packet.
+        rtt_ms: round trip.
+    """
+    return rtt_ms / 1000 + _ANSWERED_S + longest_wait_s
 
 
 class PacketSocket(Protocol):
@@ -130,6 +146,10 @@ class Reception:
         """Since when no frame can be shown."""
         self._request_s = 0.0
         """When a key frame is to be requested, while none can be shown."""
+        self._requested_s = 0.0
+        """When the last one was."""
+        self._lost_key_frames = 0
+        """Of the stream, as far as they were noted."""
         self._requested = False
         """Whether the last request is on its way."""
         self.had_data = False
@@ -207,8 +227,7 @@ class Reception:
             return False
         # Where much is lost, what is waited for does not come.
         narrow = (self._loss_percent() or 0.0) > _NARROW_PERCENT
-        rtt_s = self._statistics.rtt_ms / 1000 if self._statistics else 0.0
-        patience_s = rtt_s if narrow else _FIRST_KEY_FRAME_S
+        patience_s = self._rtt_s if narrow else _FIRST_KEY_FRAME_S
         return now_s - self._taken_s > self._options.max_age_s + patience_s
 
     def _needs_rejoin(self, now_s: float) -> bool:
@@ -227,16 +246,32 @@ class Reception:
         if self._torn_s is None:
             self._torn_s = now_s
             # Before the first frame, the key frame that a new connection gets may be under way.
-            self._request_s = now_s if shown else now_s + _REPEAT_S
+            self._request_s = now_s if shown else now_s + _FIRST_REQUEST_S
+        if self._has_lost_the_answer(now_s):
+            self._request_s = now_s
         if self._requested and not self._options.takes_requests():
             self._request_s = now_s
         if now_s < self._request_s:
             return False
         self._requested = request is not None and request(stream.newest_pts)
         if self._requested:
-            self._request_s = now_s + _REPEAT_S
+            self._requested_s = now_s
+            self._request_s = now_s + repeat_s(self._reorder.wait_s, self._rtt_s * 1000)
             return False
         return now_s - self._torn_s >= (_REJOIN_AFTER_S if shown else _FIRST_KEY_FRAME_S)
+
+    def _has_lost_the_answer(self, now_s: float) -> bool:
+        """Whether a key frame was lost since the last look that may be the one that was requested.
+
+        The robot ignores a request for which one is on its way, so another one that is lost costs nothing.
+        """
+        noted, self._lost_key_frames = self._lost_key_frames, self._stream.lost_key_frames
+        return self._lost_key_frames > noted and now_s - self._requested_s >= self._rtt_s
+
+    @property
+    def _rtt_s(self) -> float:
+        """The round trip, in seconds; 0 before it is measured."""
+        return self._statistics.rtt_ms / 1000 if self._statistics else 0.0
 
     def _update(self) -> None:
         statistics = self._connection.statistics()

@@ -61,6 +61,7 @@ class TransportStream:
         torn: whether access units are dropped until the next key frame, as at the beginning.
         breaks: how often a torn time began after a whole access unit.
         dropped_units: access units that were dropped, as far as their beginning arrived.
+        lost_key_frames: key frames among these.
         newest_pts: PTS of the newest access unit of which the beginning arrived, in ticks; None before one.
     """
 
@@ -80,7 +81,7 @@ class TransportStream:
         """Whether a PES packet is being collected."""
         self._units: list[AccessUnit] = []
         self.torn = True
-        self.breaks = self.dropped_units = 0
+        self.breaks = self.dropped_units = self.lost_key_frames = 0
         self.newest_pts: int | None = None
 
     def damage(self) -> None:
@@ -166,7 +167,7 @@ class TransportStream:
         if not self._open:
             return
         pes = b"".join(self._parts)
-        unit = pes[_PES_HEADER_BYTES + pes[8] :]
+        unit = _unit(pes)
         if not complete or not unit:
             self._tear()
         if self.torn and (not complete or not _is_key(unit, self._codec)):
@@ -177,7 +178,9 @@ class TransportStream:
 
     def _discard(self) -> None:
         """Drops the PES packet under way, if there is one."""
-        self.dropped_units += self._open
+        if self._open:
+            self.dropped_units += 1
+            self.lost_key_frames += _is_key(_unit(b"".join(self._parts)), self._codec)
         self._open = False
 
     def _tear(self) -> None:
@@ -236,6 +239,11 @@ def _section(packet: bytes) -> bytes:
     # The header and CRC of a PMT, the longer one, have 16 bytes; bit 0 of byte 5: applicable now.
     current = end <= len(packet) and end - at >= 12 and packet[at + 5] & 1
     return packet[at:end] if current else b""
+
+
+def _unit(pes: bytes) -> bytes:
+    """Returns the access unit of a PES packet, as far as it is there."""
+    return pes[_PES_HEADER_BYTES + pes[8] :]
 
 
 def _is_key(unit: bytes, codec: str) -> bool:

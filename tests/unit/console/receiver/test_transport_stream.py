@@ -41,6 +41,26 @@ def test_each_unit_comes_with_its_last_packet(codec: str) -> None:
     assert (reader.torn, reader.breaks, reader.dropped_units) == (False, 0, 0)
 
 
+@pytest.mark.parametrize("codec", ["h264", "h265"])
+@pytest.mark.parametrize(
+    ("number", "packet", "lost"),
+    [
+        pytest.param(5, -1, 1, id="the end of a key frame"),
+        pytest.param(5, 3, 1, id="the middle of one"),
+        pytest.param(5, 2, 0, id="its beginning, without which it is not known to be one"),
+        pytest.param(6, 1, 0, id="another frame"),
+    ],
+)
+def test_key_frames_that_are_lost_are_counted(codec: str, number: int, packet: int, lost: int) -> None:
+    reader = TransportStream()
+    for index, packets in enumerate(stream(Writer(codec), 10)):
+        if index == number:
+            del packets[packet]
+        fed(reader, packets)
+    assert reader.torn
+    assert reader.lost_key_frames == lost
+
+
 def test_a_payload_of_seven_packets_is_read_at_once() -> None:
     packets = b"".join(packet for frame in stream(Writer(), 10) for packet in frame)
     reader = TransportStream()
