@@ -4,7 +4,12 @@ import atexit
 import ctypes
 import errno
 import os
+import re
+import shutil
+import subprocess
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,7 +19,18 @@ from console.receiver.libsrt import LibsrtMissingError, LocalSocketError
 
 pytestmark = pytest.mark.gst
 
+ROOT = Path(__file__).parents[4]
 GOOD = 0x010501
+MAPPED = re.compile(r"\S*/libsrt[-.]\S*")
+BOTH_LOADED = """
+import sys
+from common.gst import Gst
+from console.receiver import libsrt
+libsrt._NAMES = (sys.argv[1],)
+libsrt.load()
+assert Gst.ElementFactory.make("srtsrc"), "GStreamer's SRT plugin is not installed"
+print(open("/proc/self/maps", encoding="utf-8").read())
+"""
 
 
 class Library:
@@ -72,6 +88,18 @@ def test_a_library_that_can_not_be_used_is_reported(
         load(monkeypatch, lambda _name: library)
     assert caught.value.remedy == "Type: sudo apt-get install libsrt1.5-gnutls"
     assert at_exit == []
+
+
+def test_it_is_the_very_library_that_gstreamer_has_loaded(tmp_path: Path) -> None:
+    """Another one, by a name of which libsrt.py knows, would be a second libsrt in the process."""
+    libsrt.load()
+    other = tmp_path / "libsrt-gnutls.so.1.5"
+    shutil.copy(min(MAPPED.findall(Path("/proc/self/maps").read_text(encoding="utf-8"))), other)
+    program = [sys.executable, "-c", BOTH_LOADED, str(other)]
+    done = subprocess.run(program, cwd=ROOT, capture_output=True, text=True, timeout=60, check=True)
+    mapped = set(MAPPED.findall(done.stdout))
+    assert len(mapped) == 1
+    assert str(other) not in mapped
 
 
 def test_without_any_that_opens_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
