@@ -111,7 +111,14 @@ class Guarded:
 
 @contextmanager
 def guarded_program(
-    directory: Path, home: Path, kind: Kind = Kind.TOKEN, descriptors: int | None = None, **settings: Any
+    directory: Path,
+    home: Path,
+    kind: Kind = Kind.TOKEN,
+    descriptors: int | None = None,
+    *,
+    port: int = 0,
+    also_at: str = "",
+    **settings: Any,
 ) -> Iterator[Guarded]:
     """Up when the block begins, gone when it ends.
 
@@ -120,16 +127,18 @@ def guarded_program(
         home: the laptop's configuration directory.
         kind: how its callers prove who they are.
         descriptors: how many it may have at the most.
+        port: of the gateway; 0 for any.
+        also_at: another address of this machine that it is called at; empty for loopback alone.
         settings: keys of the gateway's configuration.
     """
-    credentials, port = CredentialDirectory(directory / "credentials"), free_tcp_port()
+    credentials, port = CredentialDirectory(directory / "credentials"), port or free_tcp_port()
     admin = CredentialAdmin(credentials, ROBOT)
-    admin.initialize(HOSTS)
+    admin.initialize((*HOSTS, also_at) if also_at else HOSTS)
     _, bundle = admin.add(CredentialRequest("the-test", Role.ADMIN, kind))
     config = directory / "gateway.yaml"
     values = {
         "name": "lab-1",
-        "grpc": {"port": port},
+        "grpc": {"port": port, "host": "0.0.0.0" if also_at else "127.0.0.1"},  # noqa: S104
         "sources": [],
         "security": {
             "credentials": str(credentials.path),

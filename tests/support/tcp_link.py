@@ -47,7 +47,8 @@ class TcpLink:
         seed: of the random losses.
 
     Attributes:
-        target: HOST:PORT, by which the server is reached over the link.
+        host: by which the server is reached over the link.
+        target: the same with the port.
     """
 
     def __init__(
@@ -64,7 +65,8 @@ class TcpLink:
         # 198.18.0.0/15 is for tests of networks (RFC 2544 C.2.2).
         number = int(self._name.removeprefix(_PREFIX))
         self._subnet = f"198.18.{number % 256}"
-        self.target = f"{self._subnet}.2:{to_port}"
+        self.host = f"{self._subnet}.2"
+        self.target = f"{self.host}:{to_port}"
         self._stop_here, self._stop_there = socket.socketpair()
         self._thread = threading.Thread(target=self._run, name="TCP link")
 

@@ -24,7 +24,6 @@ from tests.support.driven_robot import (
     held,
     in_motion,
     moving,
-    stop_by,
     was_held,
 )
 from tests.support.eventually import eventually
@@ -33,6 +32,7 @@ from tests.support.heard import Base
 from tests.support.module_program import module_program
 from tests.support.promise import keeps_async
 from tests.support.running_drive import RunningDrive
+from tests.support.shared_robot import shared_robot
 from tests.support.undisturbed import DisturbedError
 
 pytestmark = [pytest.mark.ros, pytest.mark.timed, pytest.mark.alone]
@@ -179,19 +179,23 @@ async def test_a_lost_gateway_stops_in_time(
     await keeps_async(promised_s, "s of motion after the gateway was lost", measure)
 
 
-async def test_a_stop_takes_50_ms_beside_watchers_and_a_flooder(robot: DrivenRobot) -> None:
-    # Before it has moved, its nodes may not have found each other yet: a stop of one that rests is no message
-    # to those that come later.
-    async with available(robot) as driver, driver.drive(BY_EYE) as session:
-        await in_motion(driver, session, robot.base, SPEED_MPS)
+@pytest.mark.timeout(900)  # two hundred drives, several times on a machine that is busy
+async def test_a_stop_takes_50_ms_beside_watchers_and_a_flooder(
+    ros_domain: int,  # noqa: ARG001  # for its effect
+    tmp_path: Path,
+) -> None:
+    """The robot is driven each time, by another person than stops it, who may only look."""
+    with driven_base(tmp_path) as (base, drive), shared_robot(tmp_path, base, drive) as robot:
 
-    async def measure() -> float:
-        async with available(robot) as operator, AsyncGatewayClient(robot.target) as viewer:
-            with module_program("tests.support.status_siege", robot.target, str(WATCHERS), says="ready"):
-                took_s = [max(await stop_by(viewer, operator, robot.base)) for _ in range(STOPS)]
-        return statistics.quantiles(took_s, n=100)[98]
+        async def measure() -> float:
+            siege = robot.target, str(WATCHERS), str(robot.crowd)
+            with module_program("tests.support.status_siege", *siege, says="ready"):
+                stops = await robot.stops(STOPS)
+            return statistics.quantiles([max(it.at_base_s, it.answered_s) for it in stops], n=100)[98]
 
-    await keeps_async(0.05, "s at the 99th percentile until the base has zero, and the viewer knows", measure)
+        await keeps_async(
+            0.05, "s at the 99th percentile until the base has zero, and the viewer knows", measure
+        )
 
 
 async def test_a_revoked_driver_stops_within_1_1_s(ros_domain: int, tmp_path: Path) -> None:  # noqa: ARG001
