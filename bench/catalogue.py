@@ -136,7 +136,7 @@ PARTS: Final = (
     Part("bench.viewer", 1, ("viewer.extra_latency_frames",)),
     Part("bench.monitor", 1, ("monitor.loop_delay_p99_ms",)),
     Part("bench.monitor", 1, ("monitor.loop_delay_p99_full_ms",)),
-    Part("bench.drive.stopping", 14, _STOPS),
+    Part("bench.drive.stopping", 23, _STOPS),
     Part("bench.drive.picture", 4, ("drive.stop_camera_ms", "drive.stop_preview_ms", "drive.stop_screen_ms")),
     Part("bench.drive.revoking", 2, ("drive.stop_revoked_ms",)),
     Part("bench.drive.thawing", 2, ("drive.thawed_ms",)),

@@ -65,15 +65,20 @@ def driven_ground(directory: Path) -> Iterator[Ground]:
 
 
 def link(robot: DrivenRobot, loss: float = 0.0, seed: int = 1) -> TcpLink:
-    """Returns a link to a robot with a round trip of 20 ms.
+    """Returns a link to a robot with a gateway that networks reach, as `link_to`."""
+    return link_to(robot.gateway.port, loss, seed)
+
+
+def link_to(port: int, loss: float = 0.0, seed: int = 1) -> TcpLink:
+    """Returns a link with a round trip of 20 ms.
 
     Args:
-        robot: with a gateway that networks reach.
+        port: of the gateway, which networks reach.
         loss: share of lost packets, each way.
         seed: of the losses.
     """
     up, down = (Impairment(loss=loss, delay_s=ONE_WAY_S) for _ in range(2))
-    return TcpLink(robot.gateway.port, up, down, seed)
+    return TcpLink(port, up, down, seed)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,17 +8,21 @@ import os
 import signal
 import statistics
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Final, Literal
 
-from bench.drive.ground import Driver, Ground, driver, link
+from bench.drive.ground import Driver, Ground, driver, link, link_to
 from bench.processes import program
 from bench.progress import log
 from bench.rows import FEWEST_ROUNDS, Row
-from console.client import AsyncGatewayClient
 from tests.support.bad_links import Relay
-from tests.support.driven_robot import DrivenRobot, available, stop_by
+from tests.support.driven_robot import DrivenRobot
+from tests.support.free import free_tcp_port
+from tests.support.shared_robot import SharedRobot, shared_robot
 from tests.support.tcp_link import TcpLink
 from tests.support.waiting import wait_until
 
@@ -124,14 +128,14 @@ def rows(ground: Ground, wanted: set[str]) -> list[Row]:
             made.append(_row(name, what, values, fault.bar_ms))
     if "drive.stop_viewer_ms" in wanted:
         what = (
-            f"StopRobot by a viewer beside {WATCHERS} watchers and one that floods: until the base has zero"
-            f" and the viewer knows, 99th percentile of {STOPS}"
+            f"StopRobot by a viewer's login while another person drives, beside {WATCHERS} watchers and one"
+            f" that floods: until the base has zero and the viewer knows, 99th percentile of {STOPS}"
         )
         made.append(_row("viewer", what, [viewer_ms(ground) for _ in range(ROUNDS)], 50))
     if "drive.stop_viewer_lossy_ms" in wanted:
         what = (
-            f"the same without them, {LOSS:.0%} loss both ways, round trip 20 ms: until the base has zero,"
-            f" 99th percentile of {LOSSY_STOPS}"
+            f"the same without them, the viewer's link with {LOSS:.0%} loss both ways, round trip 20 ms:"
+            f" until the base has zero, 99th percentile of {LOSSY_STOPS}"
         )
         values = [viewer_lossy_ms(ground, seed) for seed in range(1, ROUNDS + 1)]
         made.append(_row("viewer_lossy", what, values, 150))
@@ -171,23 +175,32 @@ def _stopped_ms(fault: _Fault, target: str, ground: Ground, robot: DrivenRobot, 
 
 def viewer_ms(ground: Ground, stops: int = STOPS, watchers: int = WATCHERS) -> float:
     """Returns the 99th percentile of the time until the base has zero and the viewer knows."""
-    with ground.robot() as robot, program("tests.support.status_siege", robot.target, str(watchers)) as siege:
-        took = asyncio.run(_stops(robot, robot.target, stops))
+    with (
+        _shared(ground) as robot,
+        program("tests.support.status_siege", robot.target, str(watchers), str(robot.crowd)) as siege,
+    ):
+        took = asyncio.run(robot.stops(stops))
         siege.kill()
-    return _percentile_ms("StopRobot under siege", [max(each) for each in took])
+    return _percentile_ms("StopRobot under siege", [max(it.at_base_s, it.answered_s) for it in took])
 
 
 def viewer_lossy_ms(ground: Ground, seed: int, stops: int = LOSSY_STOPS) -> float:
-    """Returns the 99th percentile of the time until the base has zero, over a link that loses packets."""
-    with ground.robot() as robot, link(robot, LOSS, seed) as far:
-        took = asyncio.run(_stops(robot, far.target, stops))
-    _percentile_ms(f"StopRobot with {LOSS:.0%} loss, until the answer", [each[1] for each in took])
-    return _percentile_ms(f"StopRobot with {LOSS:.0%} loss, at the base", [each[0] for each in took])
+    """Returns the 99th percentile of the time until the base has zero; the viewer's link loses packets."""
+    port = free_tcp_port()
+    with link_to(port, LOSS, seed) as far, _shared(ground, port=port, also_at=far.host) as robot:
+        took = asyncio.run(robot.stops(stops, far.target))
+    _percentile_ms(f"StopRobot with {LOSS:.0%} loss, until the answer", [it.answered_s for it in took])
+    return _percentile_ms(f"StopRobot with {LOSS:.0%} loss, at the base", [it.at_base_s for it in took])
 
 
-async def _stops(robot: DrivenRobot, target: str, count: int) -> list[tuple[float, float]]:
-    async with available(robot) as operator, AsyncGatewayClient(target) as viewer:
-        return [await stop_by(viewer, operator, robot.base) for _ in range(count)]
+@contextmanager
+def _shared(ground: Ground, **reached: Any) -> Iterator[SharedRobot]:
+    """Yields a robot with a driver's login and a viewer's, by a gateway of its own."""
+    with (
+        TemporaryDirectory(dir=ground.directory) as name,
+        shared_robot(Path(name), ground.base, ground.drive, **reached) as robot,
+    ):
+        yield robot
 
 
 def _percentile_ms(what: str, took_s: list[float]) -> float:

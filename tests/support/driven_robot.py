@@ -2,7 +2,6 @@
 
 import asyncio
 import functools
-import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
@@ -22,7 +21,7 @@ from tests.support.driving import BEHIND_THE_MUX
 from tests.support.eventually import eventually
 from tests.support.gateway_program import GatewayProgram, gateway_program
 from tests.support.heard import Base
-from tests.support.lost_worker import RESET_WITHIN_S, ready_after_a_loss
+from tests.support.lost_worker import ready_after_a_loss
 from tests.support.ros import simulated_robot
 from tests.support.running_drive import RunningDrive, listening_base, running_drive
 from tests.support.undisturbed import (
@@ -252,49 +251,6 @@ def was_held(session: DriveSession) -> None:
     """
     if session.lapsed:
         raise DisturbedError("the hold was not renewed in time, which is a release")
-
-
-async def stop_by(
-    viewer: AsyncGatewayClient, operator: AsyncGatewayClient, base: Base
-) -> tuple[float, float]:
-    """Stops a robot that is not stopped, and resets that.
-
-    Args:
-        viewer: who stops it.
-        operator: who resets it.
-        base: where zero has to arrive.
-
-    Returns:
-        Seconds until the base had zero, and until the viewer was answered.
-    """
-    heard, began_s = len(base.heard), time.monotonic()
-    stopped = await viewer.stop_robot()
-    answered_s = time.monotonic() - began_s
-
-    async def has_zero() -> bool:
-        return len(base.heard) > heard
-
-    async def is_reset() -> bool:
-        try:
-            await operator.reset_stop(stopped.stop.stop_id)
-        except GatewayError:  # It is not known yet what else commands the robot, or its worker is replaced.
-            return await other_is_reset()
-        return True
-
-    async def other_is_reset() -> bool:
-        """Of a worker that was lost, the next one may have a stop of its own."""
-        try:
-            stop = (await operator.status()).teleop.stop
-            if stop is None or stop.stop_id == stopped.stop.stop_id:
-                return False
-            await operator.reset_stop(stop.stop_id)
-        except GatewayError:
-            return False
-        return True
-
-    await eventually(has_zero, bool, "the base has zero")
-    await eventually(is_reset, bool, "the stop is reset", RESET_WITHIN_S)
-    return base.heard[heard].at_s - began_s, answered_s
 
 
 def network_settings(port: int) -> dict[str, Any]:
