@@ -3,7 +3,7 @@
 | what the hub says | what follows |
 |---|---|
 | delivered, or refused because it has the batch | the outbox deletes it |
-| anything else, or nothing | the same batch again, after 1 s to 60 s with jitter |
+| anything else, or nothing | the same again: after 1 s to 60 s with jitter, or over the next connection |
 """
 
 import asyncio
@@ -75,7 +75,7 @@ class Sender:
                 self.failures += 1
                 self.error = str(error)
                 _log.info("it is sent again later: %s", error)
-                await backoff.wait()
+                await self._hub.pause(backoff.next_s())
 
     async def _send_batch(self) -> bool:
         """Sends a batch. Returns False if there is none."""

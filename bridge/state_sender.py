@@ -64,7 +64,7 @@ class StateSender:
                 await self._put(state)
             except HubError as error:
                 _log.info("the robot's state was not taken: %s", error)
-                await backoff.wait()
+                await self._hub.pause(backoff.next_s())
             else:
                 last, sent_s = key, time.monotonic()
                 backoff.reset()

@@ -9,8 +9,8 @@ What runs for long (`follow`, `pull`, `serve`) outlives the sessions.
 | no server answers | every server once in random order, then a pause of 1 s to 60 s with jitter, for ever |
 | a server is silent | after 1 s the next one is tried beside it, and the first that answers is taken |
 | the hub does not accept the credentials | the same; `link.reason` is REFUSED |
-| the connection is half-open | found by pings within 15 s, then as lost |
-| the connection is lost | what waits for an answer fails with UNREACHABLE; at once on to the next server |
+| the connection is half-open, or its node silent | found by pings within 15 s, then as lost |
+| the connection is lost | what waits for an answer fails with UNREACHABLE; at once on to another server |
 | a node dies | as lost; until its streams have a leader again, they fail with NO_RESPONDERS or TIMEOUT |
 """
 
@@ -135,6 +135,7 @@ class Hub:
     def __init__(self, address: FleetAddress) -> None:
         self._address = address
         self._session: Session | None = None
+        self._last_server = ""
         self._services: list[Service] = []
         self._calls: set[asyncio.Task[None]] = set()
         self._link = Link(False, "", None, "", asyncio.get_running_loop().time(), 0)
@@ -159,6 +160,11 @@ class Hub:
         if self._link.reason is HubReason.REFUSED:
             raise RefusedError(self._link.text)
         raise UnreachableError(self._link.text or f"the hub does not answer within {timeout_s:g} s")
+
+    async def pause(self, longest_s: float) -> None:
+        """Waits before something is tried again; no longer than until there is another connection."""
+        connections = self._link.connections
+        await self.changed.wait_until(lambda: self._link.connections != connections, longest_s)
 
     async def publish_once(
         self, subject: str, payload: bytes, timeout_s: float = REQUEST_TIMEOUT_S
@@ -393,9 +399,11 @@ class Hub:
         await cancel(self._calls)
 
     async def _try_servers(self) -> Session | None:
-        """Tries every server once, in random order."""
+        """Tries every server once, in random order, and the one that was lost last of all."""
         servers = list(self._address.servers)
         random.shuffle(servers)
+        # One that was lost because it is silent is silent to a new connection as well.
+        servers.sort(key=lambda server: server == self._last_server)
         try:
             return await first_to_open(servers, self._open_session)
         except HubError as error:
@@ -420,7 +428,7 @@ class Hub:
         except HubError as error:
             self._set(False, "", error)
             return
-        self._session = session
+        self._session, self._last_server = session, session.server
         self._set(True, session.server, None)
         try:
             reason = await asyncio.shield(session.lost)
@@ -449,12 +457,7 @@ class Hub:
         return self._session
 
     async def _pause(self, backoff: Backoff) -> None:
-        """Waits before something is set up again; no longer than until the connection is lost or made."""
-        connections = self._link.connections
-        await self.changed.wait_until(
-            lambda: self._link.connections != connections,
-            backoff.next_s() * random.uniform(0.5, 1.0),  # noqa: S311
-        )
+        await self.pause(backoff.next_s() * random.uniform(0.5, 1.0))  # noqa: S311
 
 
 @asynccontextmanager

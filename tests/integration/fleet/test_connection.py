@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from common.tasks import cancel
 from fleet import names
 from fleet.connection import FleetAddress, Published, Start, connect
 from fleet.consuming import pull
@@ -18,6 +19,7 @@ from fleet.session import Session
 from hub import streams
 from tests.support.free import free_tcp_port
 from tests.support.nats_servers import NatsServers, nats_servers
+from tests.support.promise import keeps_async
 from tests.support.secure_hub import SecureHub
 from tests.support.silent_server import silent_server, tried_in_order
 
@@ -168,6 +170,32 @@ async def test_a_silent_server_is_found(servers: NatsServers) -> None:
             servers.thaw(0)
         await hub.connected(20)
         await hub.publish_once("fleet.r1.ev.run.1", b"")
+
+
+@pytest.mark.timed
+async def test_a_silent_server_is_found_while_much_waits_to_be_sent(servers: NatsServers) -> None:
+    """The defect: each ping first waited for 5 s for what the server did not take."""
+
+    async def send(session: Session) -> None:
+        with suppress(UnreachableError):
+            while True:
+                await session.publish("quiet", bytes(names.LARGEST_MESSAGE))
+
+    async def found_s() -> float:
+        session = await Session.open(servers.urls[0], credentials=None, ca=None, inbox="_INBOX.x", name="")
+        servers.freeze(0)
+        begun_s = time.monotonic()
+        sending = asyncio.create_task(send(session))
+        try:
+            async with asyncio.timeout(60):
+                await asyncio.shield(session.lost)
+            return time.monotonic() - begun_s
+        finally:
+            servers.thaw(0)
+            await cancel([sending])
+            await session.close()
+
+    await keeps_async(_FOUND_WITHIN_S, "s until a silent server is found", found_s)
 
 
 async def test_an_answer_that_comes_too_late_costs_no_connection(servers: NatsServers) -> None:

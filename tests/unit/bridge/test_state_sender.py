@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from bridge import jittered_backoff, state_sender
+from bridge import state_sender
 from bridge.outbox.database import Facts
 from bridge.state_sender import StateSender
 from bridge.uploading import NoUploads
@@ -33,6 +33,7 @@ class World:
         refusals: how many states the hub refuses first.
         away_s: how long the first connection takes.
         takes_s: how long the hub takes for a state.
+        pauses: that would have ended with another connection.
         sent: states that the hub took, and when.
     """
 
@@ -47,6 +48,7 @@ class World:
         self.refusals = 0
         self.away_s = 0.0
         self.takes_s = 0.0
+        self.pauses = 0
         self.sent: list[tuple[float, RobotState]] = []
 
     @property
@@ -69,6 +71,10 @@ class World:
         self.now_s += seconds
         if self.now_s > self.end_s:
             raise EndError
+
+    async def pause(self, longest_s: float) -> None:
+        self.pauses += 1
+        await self.sleep(longest_s)
 
     async def connected(self) -> None:
         self._looks += 1
@@ -103,8 +109,7 @@ def world(monkeypatch: pytest.MonkeyPatch) -> Made:
         world = World(mode)
         clock = SimpleNamespace(monotonic=lambda: world.now_s, time_ns=lambda: round(world.now_s * 1e9))
         monkeypatch.setattr(state_sender, "time", clock)
-        for module in (state_sender, jittered_backoff):
-            monkeypatch.setattr(module, "asyncio", SimpleNamespace(sleep=world.sleep))
+        monkeypatch.setattr(state_sender, "asyncio", SimpleNamespace(sleep=world.sleep))
         return world
 
     return made
@@ -143,6 +148,7 @@ async def test_what_changed_while_the_hub_was_away_is_one_state(world: Made) -> 
     away.refusals = 3
     sender = await away.run(3620)
     assert sender.sent == len(away.sent)
+    assert away.pauses == 3
     assert [state.sequence for _, state in away.sent] == list(range(1, len(away.sent) + 1))
     assert away.times[0] >= 3600
     present = [f"mode {at_s:.0f}" for at_s in away.times]

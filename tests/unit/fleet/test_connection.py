@@ -1,0 +1,97 @@
+"""Which server comes after one that was lost, and what need not wait for long once another one answers."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from common.tasks import cancel
+from fleet.connection import FleetAddress, Hub
+from fleet.errors import HubError, UnreachableError
+from tests.support.virtual_time import in_virtual_time
+
+_STEADY_S = 20.0
+"""A connection that stood for so long was a success: there is no pause before the next one."""
+
+
+class Opened:
+    """A session with a server, until a test ends it."""
+
+    def __init__(self, server: str) -> None:
+        self.server = server
+        self.lost: asyncio.Future[HubError] = asyncio.get_running_loop().create_future()
+
+    async def close(self) -> None:
+        """There is nothing to close."""
+
+
+class Servers:
+    """Servers that all answer at once.
+
+    Attributes:
+        sessions: that were opened so far.
+    """
+
+    def __init__(self) -> None:
+        self.sessions: list[Opened] = []
+
+    async def open(self, server: str, **_: Any) -> Opened:
+        self.sessions.append(Opened(server))
+        return self.sessions[-1]
+
+    async def lose(self) -> None:
+        """The newest session ends after it has stood for a while; returns when another one stands."""
+        await asyncio.sleep(_STEADY_S)
+        self.sessions[-1].lost.set_result(UnreachableError("stale connection"))
+        await asyncio.sleep(_STEADY_S)
+
+
+@pytest.fixture
+def servers(monkeypatch: pytest.MonkeyPatch) -> Servers:
+    found = Servers()
+    monkeypatch.setattr("fleet.connection.Session", SimpleNamespace(open=found.open))
+    monkeypatch.setattr("fleet.connection.random.shuffle", lambda _servers: None)
+    return found
+
+
+@asynccontextmanager
+async def running(*servers: str) -> AsyncIterator[Hub]:
+    hub = Hub(FleetAddress(servers))
+    task = asyncio.create_task(hub.run())
+    try:
+        await hub.connected(1.0)
+        yield hub
+    finally:
+        await cancel([task])
+
+
+@in_virtual_time
+async def test_the_server_that_was_lost_is_the_last_to_be_tried(servers: Servers) -> None:
+    """One that is silent takes new connections, too: it would hold up the way to another one."""
+    async with running("a", "b", "c") as hub:
+        for _ in range(3):
+            await servers.lose()
+        assert [each.server for each in servers.sessions] == ["a", "b", "a", "b"]
+        assert hub.link.server == "b"
+
+
+@in_virtual_time
+async def test_the_only_server_is_tried_again(servers: Servers) -> None:
+    async with running("a"):
+        await servers.lose()
+        assert [each.server for each in servers.sessions] == ["a", "a"]
+
+
+@in_virtual_time
+async def test_a_pause_ends_with_another_connection(servers: Servers) -> None:
+    loop = asyncio.get_running_loop()
+    async with running("a", "b") as hub:
+        pausing = asyncio.create_task(hub.pause(1000.0))
+        await servers.lose()
+        assert pausing.done()
+        begun_s = loop.time()
+        await hub.pause(1000.0)
+        assert loop.time() - begun_s == pytest.approx(1000.0)
