@@ -188,6 +188,7 @@ def it_is_repaired(ground: VideoGround) -> None:
 
 
 @pytest.mark.timed
+@pytest.mark.alone  # Half of the 60 ms is the wait for the encoder's next frame.
 def test_a_picture_is_torn_for_a_round_trip_and_a_key_frame(
     tmp_path: Path, stamping: Camera, monkeypatch: pytest.MonkeyPatch
 ) -> None:
