@@ -178,7 +178,7 @@ def error_from(failure: grpc.RpcError, target: str, timeout_s: float) -> errors.
     if code is grpc.StatusCode.UNAVAILABLE and (why := _message_for(details, _NOT_TRUSTED)):
         return errors.NotTrusted(f"what answers at {target} is not trusted: {why}")
     if code is grpc.StatusCode.CANCELLED:
-        return errors.Unreachable(
+        return ERRORS[code](
             f"the robot gateway at {target} cancelled the call: it stops, or has more calls than it can take",
             "Try again",
         )

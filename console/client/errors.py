@@ -37,7 +37,7 @@ class GatewayError(UserError):
 
 
 class Unreachable(GatewayError):
-    """No gateway answers there: nothing listens, no route, no such name, a silent link, or one that stops."""
+    """No gateway answers there: nothing listens, no route or name, a silent link, or the gateway stops."""
 
     kind = "unreachable"
     ends_with = ExitCode.UNREACHABLE

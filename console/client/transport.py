@@ -174,29 +174,37 @@ class Responses:
         self._task.cancel()
 
     async def _receive(self, call: Any) -> None:
-        error: GatewayError
+        try:
+            error = await self._receive_all(call)
+            # Behind the items that wait to be read.
+            await self._queue.put(error)
+        except asyncio.CancelledError:
+            call.cancel()
+            if not self._task.cancelling():
+                raise
+            # Not raised: the task would keep the traceback and, with it, the call, whose connection would
+            # stay open until Python's collector comes.
+
+    async def _receive_all(self, call: Any) -> GatewayError:
+        """Receives until the stream ends; returns why."""
         try:
             async for answer in call:
                 item = self._transport.decode(self._method, answer)
                 if self._newest_only and self._queue.full():
                     self._queue.get_nowait()
                 await self._queue.put(item)
-            error = self._transport.end_of_stream(None)
         except grpc.RpcError as failure:
-            error = self._transport.end_of_stream(failure)
+            return self._transport.end_of_stream(failure)
         except GatewayFailed as failure:
             call.cancel()
-            error = failure
+            # Without the frames of this call, which would keep it.
+            return failure.with_traceback(None)
         except asyncio.CancelledError:
-            call.cancel()
             if self._task.cancelling():
-                # Not raised: the task would keep the traceback and, with it, the call, whose connection would
-                # stay open until Python's collector comes.
-                return
+                raise
             # gRPC raises it, too, when the channel was closed under the call.
-            error = Cancelled("this client was closed")
-        # Behind the items that wait to be read.
-        await self._queue.put(error)
+            return Cancelled("this client was closed")
+        return self._transport.end_of_stream(None)
 
 
 class Pull(Generic[ResultT]):
