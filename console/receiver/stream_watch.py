@@ -1,5 +1,6 @@
 """Reads a transport stream beside GStreamer's demultiplexer, for what that does not pass on. Pure."""
 
+import threading
 from collections import deque
 from typing import Final
 
@@ -16,7 +17,8 @@ class StreamWatch:
     that depend on it; decoders conceal what they lack. Where it passes on one that `TransportStream`
     withholds, the frame is torn. The two give whole access units in the same order, and with the same size.
 
-    `take` and `note` belong to the thread that feeds the demultiplexer, `is_torn` to any one.
+    `take` and `note` belong to the thread that feeds the demultiplexer, `is_torn` to that of the decoder,
+    which may be another one.
     """
 
     def __init__(self) -> None:
@@ -25,6 +27,7 @@ class StreamWatch:
         """Those that the demultiplexer has not passed on yet."""
         self._agrees = False
         """Whether any has been found there; before that nothing follows from one that is not."""
+        self._lock = threading.Lock()
         self._torn: dict[int, bool] = {}
         """Times of torn frames that the decoder has not given yet."""
 
@@ -45,14 +48,16 @@ class StreamWatch:
         if self._found(size):
             self._agrees = True
         elif self._agrees:
-            self._torn[time_ns] = True
-            if len(self._torn) > _MOST:
-                # Of a frame that the decoder has dropped.
-                self._torn.pop(next(iter(self._torn)))
+            with self._lock:
+                self._torn[time_ns] = True
+                if len(self._torn) > _MOST:
+                    # Of a frame that the decoder has dropped.
+                    del self._torn[next(iter(self._torn))]
 
     def is_torn(self, time_ns: int) -> bool:
         """Returns whether the frame of this time is torn; asked once for each."""
-        return self._torn.pop(time_ns, False)
+        with self._lock:
+            return self._torn.pop(time_ns, False)
 
     def _found(self, size: int) -> bool:
         """Returns whether an access unit of this size is due, and drops it and those before it."""

@@ -9,6 +9,9 @@ from common.gst import GLib, Gst
 SRT_PAYLOAD = 7 * 188
 """Bytes in a datagram: seven transport stream packets."""
 
+MOVING_EVERYWHERE = "zone-plate kx2=10 ky2=10 kt2=2"
+"""A pattern for `encode` in which each frame shows what is lacking of those before it."""
+
 _X26X = "tune=zerolatency speed-preset=ultrafast bitrate={kbps} key-int-max={gop}"
 _ENCODERS = {
     # Not a codec of ours: what a receiver says about it is tested.

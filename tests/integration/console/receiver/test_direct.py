@@ -41,7 +41,7 @@ from tests.support.free import free_udp_port
 from tests.support.promise import keeps
 from tests.support.receiver import NoFrameError, Receiver, show_the_first
 from tests.support.stalls import Stalls
-from tests.support.streams import SRT_PAYLOAD, SrtSender, encode
+from tests.support.streams import MOVING_EVERYWHERE, SRT_PAYLOAD, SrtSender, encode
 from tests.support.udp_link import Impairment, UdpLink
 from tests.support.undisturbed import no_stall, undisturbed
 from tests.support.waiting import wait_until
@@ -56,8 +56,8 @@ CLOSING = 7
 """SRTS_CLOSING: that state and those after it."""
 SLOW_FRAME_S = 0.1
 KEY_FRAME_EVERY = 15
-MOVING = "zone-plate kx2=10 ky2=10 kt2=2"
 LOSSY = Impairment(delay_s=0.02, loss=0.02)
+VERY_LOSSY = Impairment(delay_s=0.02, loss=0.06)
 CLOSED_WITHIN_S = 1.0
 OLDEST_S = 1.0
 STEADY_FROM = 30
@@ -76,7 +76,7 @@ def pieces() -> list[bytes]:
 
     Everything in them moves, so that each shows what is lacking of those before it.
     """
-    made = encode("h264", FRAMES, kbps=2000, pattern=MOVING)
+    made = encode("h264", FRAMES, kbps=2000, pattern=MOVING_EVERYWHERE)
     assert max(map(len, made)) < 1 << 16
     return made
 
@@ -216,7 +216,7 @@ def test_without_the_withholding_torn_frames_are_shown_and_seen_to_be_torn(
     """The same link and losses: the withholding keeps them back, and the judge knows a torn frame."""
     monkeypatch.setattr(reception, "wait_s", lambda _rtt_ms: 0.005)
     monkeypatch.setattr(TransportStream, "_tear", lambda _self: None)
-    delivery, frames = watched(port, pieces, LOSSY)
+    delivery, frames = watched(port, pieces, VERY_LOSSY)
     assert delivery.given_up > 0
     assert None in whole.numbers(frames)
 
@@ -713,14 +713,20 @@ def test_srt_delivery_shows_torn_frames_and_says_so_of_each(
     sent = list(pieces)
     for number, first in ((40, 188), (60, 0)):
         sent[number] = pieces[number][:first] + pieces[number][first + SRT_PAYLOAD :]
-    with SrtSender(port) as sender, receiver(port, delivery=DeliveryChoice.SRT) as viewer:
-        assert sender.viewer_joined.wait(PATIENCE_S)
-        play(sender, sent)
-        frames = everything(viewer)
-    torn = [number is None for number in whole.numbers(frames)]
-    assert [frame.corrupt for frame in frames] == torn
-    assert torn[:40] == [False] * 40
-    assert all(torn[40:])
+
+    def attempt() -> None:
+        # In a stall, libsrt's socket overflows, or packets come too late.
+        with no_stall():
+            with SrtSender(port) as sender, receiver(port, delivery=DeliveryChoice.SRT) as viewer:
+                assert sender.viewer_joined.wait(PATIENCE_S)
+                play(sender, sent)
+                frames = everything(viewer)
+            torn = [number is None for number in whole.numbers(frames)]
+            assert [frame.corrupt for frame in frames] == torn
+            assert torn[:40] == [False] * 40
+            assert all(torn[40:])
+
+    undisturbed(attempt)
 
 
 def test_every_frame_carries_its_capture_time(port: int) -> None:

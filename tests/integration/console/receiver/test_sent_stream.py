@@ -7,7 +7,7 @@ from console.receiver.options import ReceiverOptions
 from tests.support.free import free_udp_port
 from tests.support.receiver import Receiver
 from tests.support.sent_stream import SentStream
-from tests.support.streams import SRT_PAYLOAD, SrtSender, encode
+from tests.support.streams import MOVING_EVERYWHERE, SRT_PAYLOAD, SrtSender, encode
 from tests.support.udp_link import Impairment, UdpLink
 from tests.support.waiting import wait_until
 from tests.support.whole_pictures import WholePictures
@@ -28,7 +28,7 @@ PATIENT = ReceiverOptions(max_age_s=1000)
 @pytest.fixture(scope="module", params=["h264", "h265"])
 def pieces(request: pytest.FixtureRequest) -> list[bytes]:
     """Frames of several packets each, in which everything moves."""
-    return encode(request.param, FRAMES, gop=GOP, kbps=2000, pattern="zone-plate kx2=10 ky2=10 kt2=2")
+    return encode(request.param, FRAMES, gop=GOP, kbps=2000, pattern=MOVING_EVERYWHERE)
 
 
 def test_a_frame_that_lacks_a_packet_is_torn_and_so_are_those_that_depend_on_it(pieces: list[bytes]) -> None:
