@@ -164,7 +164,10 @@ class Lanes:
 
     async def close(self) -> None:
         """Ends all lanes at once."""
-        await cancel(self._keepers)
+        # Forgotten: each has the traceback of its end, and with it its lane, whose connection would stay open
+        # until Python's collector comes.
+        keepers, self._keepers = self._keepers, []
+        await cancel(keepers)
 
     async def _first_lane(self) -> tuple[LaneTransport, Lane]:
         opening = self._opening

@@ -1,14 +1,12 @@
 """Both clients' streams against a real gateway, over links that break and gateways that end."""
 
 import asyncio
-import gc
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import aclosing
 from typing import Any
 
-import psutil
 import pytest
 
 from console.client import (
@@ -23,9 +21,9 @@ from console.client import (
 )
 from console.client.options import Backoff, ClientOptions
 from tests.support.bad_links import Relay
-from tests.support.eventually import eventually
 from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.gateway_program import GatewayProgram, gateway_program
+from tests.support.own_connections import all_closed, nothing_collected, own_connections
 from tests.support.waiting import wait_until
 
 QUICK = ClientOptions(stream_backoff=Backoff(first_s=0.02, longest_s=0.1))
@@ -138,21 +136,14 @@ async def test_closing_the_asyncio_client_ends_its_streams(gateway: GatewayProgr
 
 @pytest.mark.parametrize("stream", ["watch_status", "events"])
 async def test_a_client_that_is_closed_leaves_no_connection(gateway: GatewayProgram, stream: str) -> None:
-    async def connections() -> int:
-        found = psutil.Process().net_connections("tcp")
-        return sum(bool(each.raddr) and each.raddr.port == gateway.port for each in found)
-
-    gc.collect()
-    gc.disable()  # It would close what was forgotten, some time.
-    try:
-        await eventually(connections, lambda now: now == 0, "that of another test is closed")
+    with nothing_collected():
+        before = own_connections(gateway.port)
         async with AsyncGatewayClient(f"127.0.0.1:{gateway.port}") as client:
             async with aclosing(getattr(client, stream)()) as items:
                 await anext(items)
-            assert await connections() > 0
-        await eventually(connections, lambda now: now == 0, "it is closed")
-    finally:
-        gc.enable()
+            opened = own_connections(gateway.port) - before
+        assert opened
+        await all_closed(gateway.port, opened)
 
 
 async def test_the_robots_clock_is_known_within_its_bound(gateway: GatewayProgram) -> None:

@@ -52,6 +52,7 @@ from tests.support.driven_robot import (
 )
 from tests.support.driving import Observer
 from tests.support.eventually import eventually
+from tests.support.own_connections import all_closed, nothing_collected, own_connections
 from tests.support.promise import keeps_async
 from tests.support.relay import Relay
 from tests.support.running_gateway import raw_unary
@@ -94,6 +95,19 @@ async def in_phase(session: DriveSession, phase: DrivePhase) -> None:
 async def comes_to_rest(robot: DrivenRobot) -> None:
     """The robot's answer may overtake what it published: that comes by another thread of this process."""
     await eventually(lambda: is_at_rest(robot.base), bool, "the base is at rest")
+
+
+async def test_a_session_that_has_ended_leaves_no_connection(
+    robot: DrivenRobot, client: AsyncGatewayClient
+) -> None:
+    port = int(robot.target.rpartition(":")[2])
+    await client.status()
+    with nothing_collected():
+        before = own_connections(port)
+        async with client.drive(BY_EYE) as session:
+            opened, lanes = own_connections(port) - before, session.open_lanes
+        assert len(opened) >= lanes > 0
+        await all_closed(port, opened)
 
 
 async def test_every_time_of_motion_is_an_event(robot: DrivenRobot, client: AsyncGatewayClient) -> None:
