@@ -22,7 +22,7 @@ from tests.support.free import free_domain, free_tcp_port, free_udp_port
 from tests.support.heard import Base
 from tests.support.nats_servers import NatsServers, nats_servers
 from tests.support.ros_camera import ros_camera
-from tests.support.running_bridge import bridge_program, prepare
+from tests.support.running_bridge import BridgeProgram, bridge_program, prepare
 from tests.support.running_drive import RunningDrive
 from tests.support.running_recorder import recorder_program
 from tests.support.running_tap import RunningTap
@@ -37,6 +37,21 @@ _PASSING_FRAMES: Final = 90
 _UP_WITHIN_S: Final = 60.0
 
 
+class ArmCamera:
+    """The camera that is a ROS topic: a publisher of its own after each start."""
+
+    def __init__(self) -> None:
+        self._publishing = ExitStack()
+
+    def start(self) -> None:
+        """Begins to publish, in the domain of the environment."""
+        self._publishing.enter_context(ros_camera(_ARM_TOPIC))
+
+    def stop(self) -> None:
+        """Ends the publisher, if there is one."""
+        self._publishing.close()
+
+
 @dataclass(frozen=True, slots=True)
 class Deployment:
     """All of it, running.
@@ -46,6 +61,8 @@ class Deployment:
         target: the gateway's address.
         base: what the drive program moves.
         hub: of the fleet; one server.
+        bridge: of the robot to it.
+        arm: camera ARM.
         stream: where the preview's viewers connect while it is on.
     """
 
@@ -53,6 +70,8 @@ class Deployment:
     target: str
     base: Base
     hub: NatsServers
+    bridge: BridgeProgram
+    arm: ArmCamera
     stream: StreamAddress
     _processes: Mapping[str, int]
     _drive: RunningDrive
@@ -70,7 +89,11 @@ class Deployment:
             AssertionError: the drive program has no worker.
             OSError, psutil.Error: a program has ended.
         """
-        processes = {**self._processes, "robot-drive's worker": self._drive.worker.pid}
+        processes = {
+            **self._processes,
+            "robot-drive's worker": self._drive.worker.pid,
+            "robot-bridge": self.bridge.pid,
+        }
         return {name: Reading.of(pid, self._logs.get(name)) for name, pid in processes.items()}
 
 
@@ -87,7 +110,9 @@ def deployment() -> Iterator[Deployment]:
         }
         stack.enter_context(patch.dict(os.environ, environment))
         base, drive = stack.enter_context(driven_base(directory))
-        stack.enter_context(ros_camera(_ARM_TOPIC))
+        arm = ArmCamera()
+        stack.callback(arm.stop)
+        arm.start()
         (directory / "camera-tap").mkdir()
         tap = stack.enter_context(RunningTap(directory / "camera-tap"))
         encoded, udp, tcp = str(directory / "video-tap.sock"), free_udp_port(), free_tcp_port()
@@ -108,14 +133,12 @@ def deployment() -> Iterator[Deployment]:
         gateway = stack.enter_context(serving("robot-gateway", directory, settings))
         bridge.start()
         assert recorder.process
-        assert bridge.process
         programs = {
             "robot-gateway": gateway,
             "robot-preview": preview,
             "robot-drive": drive.process,
             "robot-tap": tap.process,
             "robot-recorder": recorder.process,
-            "robot-bridge": bridge.process,
         }
         logs = {
             "robot-gateway": directory / "robot-gateway.log",
@@ -130,6 +153,8 @@ def deployment() -> Iterator[Deployment]:
             f"127.0.0.1:{tcp}",
             base,
             hub,
+            bridge,
+            arm,
             StreamAddress("127.0.0.1", udp, LATENCY_MS),
             {name: process.pid for name, process in programs.items()},
             drive,
@@ -148,7 +173,7 @@ def _preview_settings(directory: Path, port: int, video_tap: str, camera_tap: st
         "cameras": {
             STEADY: {"kind": "test"},
             PASSING: {"kind": "gst", "description": passing, "fallback": STEADY},
-            ARM: {"kind": "ros", "topic": _ARM_TOPIC},
+            ARM: {"kind": "ros", "topic": _ARM_TOPIC, "fallback": STEADY},
         },
         "srt": {"bind": "127.0.0.1", "port": port, "latency_ms": LATENCY_MS},
         "encoders": {"order": ["x264"]},

@@ -8,8 +8,6 @@ asked for counts as failed, and its reason is logged.
 import asyncio
 import shutil
 import time
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
 from itertools import cycle
 from typing import Final
 
@@ -18,24 +16,21 @@ import psutil
 from bench.progress import log
 from bench.rows import MeasurementError, Row
 from bench.soak.deployment import ARM, PASSING, STEADY, Deployment, deployment
+from bench.soak.faults import FAULTS, Fault
 from bench.soak.operators import come_and_go
 from bench.soak.readings import FEWEST_ROUNDS, Reading, judge_together
 from console.client import AsyncGatewayClient, GatewayClient, GatewayError, PreviewProfile, PreviewState
 from console.receiver.errors import StreamError
 from tests.support.driven_robot import BY_EYE, in_motion, is_at_rest
 from tests.support.eventually import eventually
-from tests.support.hostile import CONVERSATIONS, converse
 from tests.support.receiver import Receiver
-from tests.support.waiting import wait_until
 
 MINUTES: Final = 120.0
 OPERATORS: Final = 3
 SPEED_MPS: Final = 0.1
 FRAME_WITHIN_S: Final = 10.0
-FAULT_WITHIN_S: Final = 15.0
 _PROFILES: Final = (PreviewProfile.LOW_BW, PreviewProfile.BALANCED, PreviewProfile.HIGH_QUALITY)
 _LOG_EVERY_ROUNDS: Final = 20
-_SILENT: Final = "battery"
 
 
 def rows(_ground: None, wanted: set[str], minutes: float = MINUTES) -> list[Row]:
@@ -68,7 +63,7 @@ def rows(_ground: None, wanted: set[str], minutes: float = MINUTES) -> list[Row]
     return [row for row in made if row.name in wanted]
 
 
-def one_round(robot: Deployment, profile: PreviewProfile, fault: "Fault") -> None:
+def one_round(robot: Deployment, profile: PreviewProfile, fault: Fault) -> None:
     """What people do with a robot, beside a fault.
 
     Raises:
@@ -111,58 +106,6 @@ async def _drive_and_record(robot: Deployment) -> None:
         await client.export_recording(made.id, folder)
         shutil.rmtree(folder)
         await client.delete_recording(made.id)
-
-
-Fault = Callable[[Deployment, GatewayClient], AbstractContextManager[None]]
-"""There while the block lasts."""
-
-
-@contextmanager
-def no_fault(_robot: Deployment, _client: GatewayClient) -> Iterator[None]:
-    """Nothing is wrong."""
-    yield
-
-
-@contextmanager
-def silent_sensor(robot: Deployment, client: GatewayClient) -> Iterator[None]:
-    """A topic has no messages; the fault is there before the block ends, and gone after."""
-    robot.change_sensors(silent=[_SILENT])
-    try:
-        yield
-        _wait_for_fault(client, active=True)
-    finally:
-        robot.change_sensors(silent=[])
-    _wait_for_fault(client, active=False)
-
-
-@contextmanager
-def lost_hub(robot: Deployment, _client: GatewayClient) -> Iterator[None]:
-    """The fleet's hub dies, and is started again."""
-    robot.hub.kill(0)
-    try:
-        yield
-    finally:
-        robot.hub.start_all()
-
-
-@contextmanager
-def bad_callers(robot: Deployment, _client: GatewayClient) -> Iterator[None]:
-    """Strangers send what no client would."""
-    port = int(robot.target.rpartition(":")[2])
-    for said in CONVERSATIONS.values():
-        converse(port, said)
-    yield
-
-
-FAULTS: Final = (no_fault, silent_sensor, lost_hub, bad_callers)
-
-
-def _wait_for_fault(client: GatewayClient, *, active: bool) -> None:
-    wait_until(
-        lambda: any(_SILENT in each.id and each.active for each in client.status().faults) is active,
-        f"the fault of the {_SILENT} is {'there' if active else 'gone'}",
-        FAULT_WITHIN_S,
-    )
 
 
 def _log(rounds: int, newest: dict[str, Reading]) -> None:

@@ -7,6 +7,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Final
 
+import psutil
+
+from tests.support.waiting import wait_until
+
 _ROOT: Final = Path(__file__).parents[2]
 
 
@@ -32,6 +36,12 @@ class RestartableProgram:
     @property
     def log(self) -> Path:
         return self.directory / f"{self.name}.log"
+
+    @property
+    def pid(self) -> int:
+        """Of the newest process."""
+        assert self.process
+        return self.process.pid
 
     def spawn(
         self,
@@ -61,6 +71,17 @@ class RestartableProgram:
         assert self.process
         self.process.kill()
         self.process.wait()
+
+    def freeze(self) -> None:
+        """Stops it without ending it: its connections stay open and silent."""
+        process = psutil.Process(self.pid)
+        process.suspend()
+        # Its threads end what they are at.
+        wait_until(lambda: process.status() == psutil.STATUS_STOPPED, f"{self.name} stands still")
+
+    def thaw(self) -> None:
+        """Lets it go on."""
+        psutil.Process(self.pid).resume()
 
     def stop(self) -> int:
         """Ends it as an operator would; returns its exit code."""

@@ -1,5 +1,6 @@
 """The real bridge as a process of its own, beside a hub and a gateway, and what the hub has of it."""
 
+import resource
 import subprocess
 import sys
 from collections.abc import Collection, Iterator
@@ -136,6 +137,20 @@ class BridgeProgram(RestartableProgram):
         self.spawn((sys.executable, "-m", "bridge.cli"), values, self.environment)
         if wait:
             wait_until(self._serves, "the bridge serves", _UP_WITHIN_S)
+
+    @contextmanager
+    def full_disk(self) -> Iterator[None]:
+        """Its files take nothing more until the block ends: no disk has to be mounted.
+
+        The kernel's error is EFBIG (setrlimit(2)), which the bridge calls an error of the disk; that of a
+        full one has another name, and the same consequences.
+        """
+        before = resource.prlimit(self.pid, resource.RLIMIT_FSIZE)
+        resource.prlimit(self.pid, resource.RLIMIT_FSIZE, (0, before[1]))
+        try:
+            yield
+        finally:
+            resource.prlimit(self.pid, resource.RLIMIT_FSIZE, before)
 
     def _serves(self) -> bool:
         self.assert_alive()

@@ -8,8 +8,9 @@ from itertools import cycle, islice
 import pytest
 
 from bench.soak.deployment import Deployment, deployment
+from bench.soak.faults import DEATHS, FAULTS, Fault
 from bench.soak.readings import Reading
-from bench.soak.robot import FAULTS, Fault, one_round
+from bench.soak.robot import one_round
 from console.client import PreviewProfile
 from tests.support.waiting import wait_until
 
@@ -27,7 +28,7 @@ PROGRAMS = {
 }
 
 
-ROUNDS = 2 * len(FAULTS)
+ROUNDS = len(FAULTS)
 """Until all is warm; a span is twice as many."""
 SPANS = 3
 """In each of which a leak adds something. A pool of threads takes one more at any time, until its bound: one
@@ -44,7 +45,7 @@ def robot() -> Iterator[Deployment]:
         yield running
 
 
-@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.__name__)
+@pytest.mark.parametrize("fault", [*FAULTS, *DEATHS], ids=lambda fault: fault.__name__)
 def test_everyone_is_served_beside_a_fault(robot: Deployment, fault: Fault) -> None:
     one_round(robot, PreviewProfile.LOW_BW, fault)
 
