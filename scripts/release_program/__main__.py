@@ -27,7 +27,12 @@ def main() -> int:
     """Makes the release and returns 0; prints one line and returns 1 where that is refused or fails."""
     parser = argparse.ArgumentParser(prog="scripts/release", description="Makes a release from the commit.")
     parser.add_argument("version", metavar="VERSION", help="the version of pyproject.toml")
-    parser.add_argument("--output", type=Path, metavar="DIR", help="build/robot-gateway-VERSION by default")
+    parser.add_argument(
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help="by default build/robot-gateway-VERSION, or build/robot-gateway-VERSION-arm64",
+    )
     parser.add_argument(
         "--python",
         action="append",
@@ -46,11 +51,12 @@ def main() -> int:
         help="of the robots that the images are for; linux/amd64 by default",
     )
     options = parser.parse_args()
-    output = (options.output or _ROOT / f"build/robot-gateway-{options.version}").absolute()
+    platform = None if options.without_images else options.platform
+    name = f"robot-gateway-{options.version}{images.PLATFORMS[platform] if platform else ''}"
+    output = (options.output or _ROOT / "build" / name).absolute()
     try:
         commit = _permitted(options.version)
         pythons = tuple(options.python or _PYTHONS)
-        platform = None if options.without_images else options.platform
         _make(options.version, commit, output, pythons, platform)
     except UserError as error:
         print(f"release: {error}", file=sys.stderr)

@@ -1,9 +1,14 @@
 """The images of a release, by a stand-in for scripts/images."""
 
+import os
+import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
 from release_program.images import PLATFORMS, build, save
+
+from tests.support.engine import ROOT
 
 STAND_IN = """#!/bin/sh
 echo "$TAG: $*" >> "$(dirname "$0")/calls"
@@ -34,9 +39,24 @@ def test_those_of_another_processor_have_a_tag_of_their_own(root: Path, platform
     assert (root / "IMAGES").read_text().startswith(f"robot-gateway:{tag} sha256:0\n")
 
 
-def test_the_tags_end_as_scripts_images_makes_them_on_x86_64() -> None:
-    """There, the images of this processor have no ending, and others that of their architecture."""
-    assert {
-        platform: f"-{platform.partition('/')[2]}" if platform != "linux/amd64" else ""
-        for platform in PLATFORMS
-    } == PLATFORMS
+@pytest.mark.parametrize("platform", PLATFORMS)
+def test_the_tags_end_as_scripts_images_makes_them_on_x86_64(tmp_path: Path, platform: str) -> None:
+    """By the script itself, with a Docker that writes down the tag."""
+    for name in ("scripts/images", "docker/build-secrets.sh", "docker/empty", "pyproject.toml"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        shutil.copy(ROOT / name, tmp_path / name)
+    answers = "*Server.Version*) echo 28 ;; *Size*) echo 0 ;;"
+    programs = {
+        "uname": "echo x86_64",
+        "docker/emulation": "",
+        "docker/docker": f'echo "$TAG" > "$0.tag"; case "$*" in {answers} esac',
+    }
+    for name, body in programs.items():
+        (tmp_path / name).write_text(f"#!/bin/sh\n{body}\n")
+        (tmp_path / name).chmod(0o755)
+    subprocess.run(
+        [tmp_path / "scripts/images", "build", "--ros", "packages", "--platform", platform],
+        env={**os.environ, "PATH": f"{tmp_path}:{tmp_path}/docker:{os.environ['PATH']}", "TAG": "1.4.0"},
+        capture_output=True, timeout=60, check=True,
+    )  # fmt: skip
+    assert (tmp_path / "docker/docker.tag").read_text() == f"1.4.0{PLATFORMS[platform]}\n"
