@@ -298,17 +298,32 @@ def test_a_service_that_was_started_by_hand_comes_along(robot: Robot) -> None:
     assert robot.running("extra") == "9.1.0"
 
 
-def test_a_service_that_the_release_does_not_have_is_stopped(robot: Robot) -> None:
+def with_more_services(robot: Robot) -> None:
+    """Has version 1.0.0 run one that no release has, and beside it one that is the robot's own."""
     robot.begin()
-    (robot.directory / "compose.yaml").write_text(
-        COMPOSE.replace("volumes:\n  state:", f"{DROPPED}volumes:\n  state:")
-    )
-    robot.compose("up", "--detach")
+    compose = robot.directory / "compose.yaml"
+    compose.write_text(COMPOSE.replace("volumes:\n  state:", f"{DROPPED}volumes:\n  state:"))
+    own = robot.directory / "own.yaml"
+    own.write_text("services:" + DROPPED.replace("dropped", "own"))
+    robot.compose("--file", "compose.yaml", "--file", own.name, "up", "--detach")
+    assert robot.services() == {"gateway", "dropped", "own"}
+
+
+def test_a_service_that_the_release_does_not_have_is_removed(robot: Robot) -> None:
+    with_more_services(robot)
     upgraded = robot.upgrade(robot.release("9.1.0"))
     assert upgraded.returncode == 0, upgraded.stderr
-    assert robot.services() == {"gateway"}
-    assert robot.upgrade("--rollback").returncode == 0
-    assert robot.services() == {"gateway", "dropped"}
+    assert robot.services() == {"gateway", "own"}
+    back = robot.upgrade("--rollback")
+    assert back.returncode == 0, back.stderr
+    assert robot.services() == {"gateway", "dropped", "own"}
+
+
+def test_it_runs_again_where_the_release_does_not_become_healthy(robot: Robot) -> None:
+    with_more_services(robot)
+    failed = robot.upgrade(robot.release("9.1.0", healthy=False), within_s=20)
+    assert "1.0.0 is in use again, as before" in failed.stderr
+    assert robot.services() == {"gateway", "dropped", "own"}
 
 
 def test_only_what_runs_and_the_way_back_take_room(robot: Robot) -> None:
