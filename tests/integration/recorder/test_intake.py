@@ -181,8 +181,12 @@ def test_a_map_whose_publishers_could_not_be_examined_at_first_is_in_later_segme
 
         patch.setattr(node, "get_publishers_info_by_topic", unreadable)
         latched = QoSProfile(durability=DurabilityPolicy.TRANSIENT_LOCAL, depth=1)
+        taken.intake.want(frozenset({"nothing"}))
+        caught_up(taken)
         publisher = talker.node.create_publisher(String, "/map", latched)
         publisher.publish(String(data="before"))
+        # Not sooner: with a subscription, the message would be no more of the past.
+        taken.intake.want(frozenset({"everything"}))
         subscribed(publisher)
         assert not taken.samples("/map"), "a volatile subscription gets nothing of the past"
     wait_until(lambda: kept_for_later_segments(taken), "the map, as late subscribers get it")
