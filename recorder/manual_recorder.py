@@ -27,8 +27,8 @@ _log = logging.getLogger(__name__)
 
 _MEASURED_S: Final = 10.0
 """A shorter recording says little about what its preset takes."""
-_MISSING: Final = 0.1
-"""Nor does one whose video is missing for a larger share of its length."""
+_MOST_VIDEO_MISSING: Final = 0.1
+"""A recording that lacks its video for a larger share of its length would make the preset seem small."""
 _NS_PER_S: Final = 1_000_000_000
 _NS_PER_MS: Final = 1_000_000
 
@@ -241,9 +241,11 @@ class ManualRecorder:
     async def _remember_rate(self, manifest: Manifest) -> None:
         """Keeps what the preset takes, on the disk as well: a recording may end without any request."""
         length_s = (manifest.ended_monotonic_ns - manifest.started_monotonic_ns) / _NS_PER_S
+        if length_s < _MEASURED_S:
+            return
         # Without its frames it would pass for a small one of those that have them.
         with_video = manifest.video_frames > 0
-        if length_s < _MEASURED_S or (with_video and _without_video_s(manifest) > _MISSING * length_s):
+        if with_video and _without_video_s(manifest) > _MOST_VIDEO_MISSING * length_s:
             return
         rate = int(manifest.size * 60 / length_s)
         self._state_file.measure(manifest.preset, rate, with_video=with_video)

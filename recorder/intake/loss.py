@@ -123,7 +123,7 @@ class LossCounter:
             publishers: identities of those that the graph has now; None if it can't be examined.
         """
         exact = publishers is not None
-        # Without any, those that were known count: the same ones may come back.
+        # While the graph shows no publisher, the former ones stay known.
         if publishers and publishers != self._publishers:
             exact = len(self._recent) <= _MAX_RECENT
             if exact:

@@ -215,9 +215,12 @@ class Manifest(_Part):
         """
         yield from self.gaps
         from_ns = self.window_ns[0] if self.window_ns else 0
-        known = [each for each in self.gaps if _is_of_all(each)]
+        known = [each for each in self.gaps if _stops_all_channels(each)]
         for gap in (each for segment in self.segments for each in segment.gaps):
-            if not (_is_of_all(gap) and (gap.ended_ns <= from_ns or any(_meet(gap, each) for each in known))):
+            if not (
+                _stops_all_channels(gap)
+                and (gap.ended_ns <= from_ns or any(_touch(gap, each) for each in known))
+            ):
                 yield gap
 
     @property
@@ -334,13 +337,14 @@ class Manifest(_Part):
         replace_file(folder / MANIFEST, self.model_dump_json(indent=1, exclude_defaults=True).encode())
 
 
-def _is_of_all(gap: Gap) -> bool:
+def _stops_all_channels(gap: Gap) -> bool:
     """Returns whether a gap is of all channels, and of unknown size: as what an interruption has cost."""
     causes = (GapCause.INTERRUPTED, GapCause.DISK)
     return gap.cause in causes and not gap.topic and gap.messages is None
 
 
-def _meet(gap: Gap, other: Gap) -> bool:
+def _touch(gap: Gap, other: Gap) -> bool:
+    """Returns whether they have an instant in common."""
     return gap.began_ns <= other.ended_ns and other.began_ns <= gap.ended_ns
 
 
