@@ -219,7 +219,7 @@ class Manifest(_Part):
         for gap in (each for segment in self.segments for each in segment.gaps):
             if not (
                 _stops_all_channels(gap)
-                and (gap.ended_ns <= from_ns or any(_touch(gap, each) for each in known))
+                and (gap.ended_ns <= from_ns or any(_are_one(gap, each) for each in known))
             ):
                 yield gap
 
@@ -343,9 +343,13 @@ def _stops_all_channels(gap: Gap) -> bool:
     return gap.cause in causes and not gap.topic and gap.messages is None
 
 
-def _touch(gap: Gap, other: Gap) -> bool:
-    """Returns whether they have an instant in common."""
-    return gap.began_ns <= other.ended_ns and other.began_ns <= gap.ended_ns
+def _are_one(gap: Gap, other: Gap) -> bool:
+    """Returns whether two interruptions are the same: of two that follow each other, one instant is shared.
+
+    The cause alone says little: the ring's own numbers do not have it, a file has.
+    """
+    shared_ns = min(gap.ended_ns, other.ended_ns) - max(gap.began_ns, other.began_ns)
+    return shared_ns > 0 or (shared_ns == 0 and gap.cause is other.cause)
 
 
 class DamagedManifestError(Exception):

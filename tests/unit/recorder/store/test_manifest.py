@@ -102,6 +102,31 @@ def test_gaps_of_unknown_size_are_counted_and_never_read_as_nothing_lost() -> No
     assert manifest().losses.counted == 0
 
 
+def stop(began_ns: int, ended_ns: int, cause: GapCause = GapCause.INTERRUPTED) -> Gap:
+    return Gap("", cause, began_ns, ended_ns, None)
+
+
+def test_two_interruptions_of_which_one_follows_the_other_are_two() -> None:
+    """The defect: the one of the file vanished, because the other begins where it ends."""
+    refused, cut = stop(20, 30, GapCause.DISK), stop(30, 30)
+    found = manifest(gaps=[cut]).with_segment("data/000000.mcap", summary(gaps=(refused,)))
+    assert found.all_gaps == (refused, cut)
+    assert found.losses.uncounted == 2
+
+
+@pytest.mark.parametrize(
+    ("known", "in_file"),
+    [
+        (stop(30, 30), stop(30, 40)),
+        (stop(20, 30), stop(20, 30, GapCause.DISK)),
+    ],
+    ids=["longer in the file", "a hole of the ring, of which the next file alone knows the cause"],
+)
+def test_an_interruption_that_file_and_manifest_have_is_one(known: Gap, in_file: Gap) -> None:
+    found = manifest(gaps=[known]).with_segment("data/000000.mcap", summary(gaps=(in_file,)))
+    assert found.all_gaps == (known,)
+
+
 def test_gaps_beyond_the_bound_are_counted_one_by_one() -> None:
     gaps = [*(gap(at) for at in range(MAX_GAPS)), *(gap(at + MAX_GAPS, None) for at in range(7))]
     made = manifest(gaps=gaps)
