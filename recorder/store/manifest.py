@@ -11,6 +11,7 @@ from typing import Final, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from recorder.mcap.records import note_of_gap
+from recorder.outages import parts_within
 from recorder.store.folder import ID, MANIFEST, SEGMENT, replace_file, segment_number
 from recorder.values import VIDEO_TOPIC, ChannelSummary, Gap, GapCause, Losses, SegmentSummary
 
@@ -211,17 +212,16 @@ class Manifest(_Part):
     def _gaps(self) -> Iterator[Gap]:
         """Yields each gap once: an interruption is in the segment that follows it, too, which may be older.
 
-        A segment of the ring may have one that ended before what a snapshot is to contain.
+        A segment of the ring may have one that began before what a snapshot is to contain.
         """
         yield from self.gaps
-        from_ns = self.window_ns[0] if self.window_ns else 0
         known = [each for each in self.gaps if _stops_all_channels(each)]
         for gap in (each for segment in self.segments for each in segment.gaps):
-            if not (
-                _stops_all_channels(gap)
-                and (gap.ended_ns <= from_ns or any(_are_one(gap, each) for each in known))
-            ):
+            if not _stops_all_channels(gap):
                 yield gap
+                continue
+            parts = parts_within((gap,), *self.window_ns) if self.window_ns else (gap,)
+            yield from (part for part in parts if not any(_are_one(part, each) for each in known))
 
     @property
     def sha256(self) -> bytes:

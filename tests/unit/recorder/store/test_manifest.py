@@ -127,6 +127,14 @@ def test_an_interruption_that_file_and_manifest_have_is_one(known: Gap, in_file:
     assert found.all_gaps == (known,)
 
 
+def test_of_an_interruption_a_snapshot_has_what_lies_in_its_window() -> None:
+    """The defect: a night without the ring was shown whole if its first message came within the window."""
+    made = manifest(kind=Kind.SNAPSHOT, window_ns=(20, 50))
+    before, during, lost = stop(1, 19), stop(5, 40), gap(7)
+    made = made.with_segment("data/000000.mcap", summary(gaps=(before, during, lost)))
+    assert made.all_gaps == (lost, stop(20, 40))
+
+
 def test_gaps_beyond_the_bound_are_counted_one_by_one() -> None:
     gaps = [*(gap(at) for at in range(MAX_GAPS)), *(gap(at + MAX_GAPS, None) for at in range(7))]
     made = manifest(gaps=gaps)
