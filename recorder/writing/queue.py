@@ -12,7 +12,7 @@ _OVERHEAD_BYTES: Final = 256
 """Of a message's objects in memory, roughly."""
 MAX_NOTES: Final = 256
 """Beyond the bound in bytes: changes of the video's stream come by the second, some hundred bytes each."""
-_LEFT_OUT: Final = "notes_left_out"
+LEFT_OUT: Final = "notes_left_out"
 """Key of a note that stands for others as well: how many."""
 
 
@@ -127,7 +127,7 @@ class SampleQueue:
 
 def _standing_for(others: int, note: Note) -> Note:
     """Returns the note, with the number of those that it has replaced."""
-    return replace(note, values={**note.values, _LEFT_OUT: str(others)}) if others else note
+    return replace(note, values={**note.values, LEFT_OUT: str(others)}) if others else note
 
 
 def merged(first: Loss, second: Loss) -> Loss:

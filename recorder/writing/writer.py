@@ -6,11 +6,12 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future
+from dataclasses import replace
 from typing import Any, Final, Protocol, TypeVar
 
 from recorder.values import Channel, Ended, Item, Note, Sample
 from recorder.writing.output import Head, Output
-from recorder.writing.queue import SampleQueue
+from recorder.writing.queue import LEFT_OUT, SampleQueue
 
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")
@@ -170,7 +171,7 @@ class Writer:
             self._latched.forget(item.channel)
             return
         elif isinstance(item, Note) and (item.name in self._notes or len(self._notes) < _MAX_NOTES):
-            self._notes[item.name] = item
+            self._notes[item.name] = _holding(item)
         for output in tuple(self._outputs):
             try:
                 output.write(item)
@@ -191,6 +192,11 @@ class Writer:
         self._outputs.remove(output)
         output.abandon()
         self._failed(output, error)
+
+
+def _holding(note: Note) -> Note:
+    """Returns what holds of it in later segments, which lack none of those that it has replaced."""
+    return replace(note, values={key: text for key, text in note.values.items() if key != LEFT_OUT})
 
 
 class _Job:
