@@ -4,6 +4,8 @@ from collections.abc import Hashable, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
+from rclpy.qos import DurabilityPolicy
+
 from common.receive_time import Instant, received_at
 from common.ros_node import subscribe_raw
 from recorder.intake.loss import LossCounter
@@ -52,6 +54,10 @@ class Source:
         self._emptied_at_s = now.monotonic_s
         self._loss = LossCounter()
         self._recent: dict[_Key, None] = {}
+        self._newest_ns = 0
+        """Source time of the newest message."""
+        self._history_until_ns = 0
+        """What the next subscription has up to this source time is history, whose numbers begin anew."""
         self._measured_from_s = now.monotonic_s
         self._messages = self._bytes = 0
 
@@ -61,14 +67,17 @@ class Source:
         Raises:
             Exception: rclpy's; nothing has been taken.
         """
-        samples = self._fresh(self._drain(self._subscription, now))
+        samples = counted = self._fresh(self._drain(self._subscription, now))
         if self._next:
-            samples += self._fresh(self._drain(self._next, now))
+            more = self._fresh(self._drain(self._next, now))
+            counted = samples + [each for each in more if each.publish_time_ns > self._history_until_ns]
+            samples = samples + more
             if now.monotonic_s >= self._switch_at_s:
                 self._switch()
-        for each in samples:
+        for each in counted:
             self._loss.take(each.sequence, each.log_time_ns, each.publish_time_ns)
-            self._bytes += len(each.data)
+            self._newest_ns = max(self._newest_ns, each.publish_time_ns)
+        self._bytes += sum(len(each.data) for each in samples)
         self._messages += len(samples)
         self._emptied_at_s = now.monotonic_s
         if samples and self.channel.latched:
@@ -127,6 +136,8 @@ class Source:
         if changed or depth != self._depth:
             self._next = subscribe_raw(self._node, self._message_type, self.channel.topic, profile)
             self._profile, self._depth = profile, depth
+            if profile.durability == DurabilityPolicy.TRANSIENT_LOCAL:
+                self._history_until_ns = self._newest_ns
             self._switch_at_s = now.monotonic_s + OVERLAP_S
             if offers and is_latched(offers) and not self.channel.latched:
                 # Before its history comes, which later segments are to begin with.
@@ -135,6 +146,7 @@ class Source:
     def _switch(self) -> None:
         self._node.destroy_subscription(self._subscription)
         self._subscription, self._next = self._next, None
+        self._history_until_ns = 0
         if not self.channel.latched:
             self._recent.clear()
 

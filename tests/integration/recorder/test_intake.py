@@ -180,7 +180,7 @@ def test_a_map_whose_publishers_could_not_be_examined_at_first_is_in_later_segme
             raise UnicodeDecodeError("utf-8", b"\xff", 0, 1, "invalid start byte")
 
         patch.setattr(node, "get_publishers_info_by_topic", unreadable)
-        latched = QoSProfile(durability=DurabilityPolicy.TRANSIENT_LOCAL, depth=1)
+        latched = QoSProfile(durability=DurabilityPolicy.TRANSIENT_LOCAL, depth=5)
         taken.intake.want(frozenset({"nothing"}))
         caught_up(taken)
         publisher = talker.node.create_publisher(String, "/map", latched)
@@ -189,13 +189,16 @@ def test_a_map_whose_publishers_could_not_be_examined_at_first_is_in_later_segme
         taken.intake.want(frozenset({"everything"}))
         subscribed(publisher)
         assert not taken.samples("/map"), "a volatile subscription gets nothing of the past"
+        for number in range(3):
+            publisher.publish(String(data=f"during {number}"))
+        wait_until(lambda: len(taken.samples("/map")) == 3, "the maps, as they are sent")
     wait_until(lambda: kept_for_later_segments(taken), "the map, as late subscribers get it")
     publisher.publish(String(data="after"))
     wait_until(lambda: b"after" in taken.samples("/map")[-1].data, "the next map")
     (kept,) = kept_for_later_segments(taken)
     assert b"after" in kept
     caught_up(taken)
-    assert not [each for each in taken.items if isinstance(each, Loss)]
+    assert not [each for each in taken.items if isinstance(each, Loss)], "what comes again was not lost"
 
 
 def test_qos_follows_publishers_that_join_later(talker: Talker, taken: Taken) -> None:
