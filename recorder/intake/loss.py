@@ -26,11 +26,13 @@ class _Sequence:
         last: number of the newest.
         at_ns: its log time.
         published_ns: its source time; -1 if unknown.
+        known: whether it was there at the last `collect`.
     """
 
     last: int
     at_ns: int
     published_ns: int
+    known: bool = False
 
 
 @dataclass(slots=True)
@@ -115,6 +117,7 @@ class LossCounter:
             elif len(self._restarts) < _MAX_RANGES:
                 self._restarts.append((oldest.at_ns, at_ns))
             oldest.last, oldest.at_ns, oldest.published_ns = number, at_ns, published_ns
+            oldest.known = False
 
     def collect(self, publishers: frozenset[Hashable] | None) -> Lost | None:
         """Returns what has been missing since the last call.
@@ -131,6 +134,8 @@ class LossCounter:
             self._expect(publishers)
         missing, self._missing = self._missing, []
         restarts, self._restarts = self._restarts, []
+        for each in self._sequences:
+            each.known = True
         self._before, self._surplus_before = [replace(each) for each in self._sequences], self._surplus
         self._recent.clear()
         times = [*((each.began_ns, each.ended_ns) for each in missing), *restarts]
@@ -155,12 +160,14 @@ class LossCounter:
         gone = len(self._publishers - publishers)
         none_stays = bool(self._publishers) and self._publishers.isdisjoint(publishers)
         self._publishers, self._expected = publishers, _bounded(len(publishers))
+        if none_stays:
+            # Of a publisher that has taken the place of another, nothing is known but what it has sent since.
+            self._sequences = [each for each in self._sequences if not each.known]
         surplus = max(0, len(self._sequences) - self._expected)
         self._sequences.sort(key=lambda each: each.at_ns)
-        # Of a publisher that has taken the place of another, nothing is known but what it has sent since.
-        del self._sequences[: max(surplus, len(self._before)) if none_stays else surplus]
+        del self._sequences[:surplus]
         # Which ones they are is not known: one that was kept may be of a publisher that has gone.
-        self._surplus = 0 if none_stays else max(surplus, min(gone, len(self._sequences)))
+        self._surplus = surplus if none_stays else max(surplus, min(gone, len(self._sequences)))
 
     def _found(self, number: int) -> bool:
         """Removes a number from the missing ones; returns whether it was one."""

@@ -78,6 +78,33 @@ def test_a_publisher_that_has_taken_the_place_of_another_is_no_gap(counter: Loss
     assert found.messages is None
 
 
+def test_a_publisher_that_was_there_beside_the_one_whose_place_it_takes_is_no_gap(
+    counter: LossCounter,
+) -> None:
+    """The defect: the newest message was taken for its own, and its next one for a restart."""
+    take(counter, [97, 98])
+    assert counter.collect(ONE) is None
+    for at, number in enumerate([99, 1, 100], 1000):
+        counter.take(number, at)
+    assert counter.collect(frozenset({"b"})) is None
+    for at, number in enumerate([2, 3], 2000):
+        counter.take(number, at)
+    assert counter.collect(frozenset({"b"})) is None
+    counter.take(5, 3000)
+    assert lost(counter, frozenset({"b"})) == 1
+
+
+def test_two_publishers_of_which_one_leaves_before_the_graph_is_examined_are_no_gap() -> None:
+    counter = LossCounter()
+    counter.collect(ONE)
+    for at, number in enumerate([1, 1, 2]):
+        counter.take(number, at, published_ns=at + 1)
+    assert counter.collect(frozenset({"b"})) is None
+    for at, number in enumerate([2, 3], 10):
+        counter.take(number, at, published_ns=at + 1)
+    assert counter.collect(frozenset({"b"})) is None
+
+
 def test_a_publisher_that_is_back_is_no_gap(counter: LossCounter) -> None:
     take(counter, [97, 98, 99])
     for publishers in (ONE, frozenset[Hashable](), frozenset({"b"})):
