@@ -162,12 +162,14 @@ class LossCounter:
         self._publishers, self._expected = publishers, _bounded(len(publishers))
         if none_stays:
             # Of a publisher that has taken the place of another, nothing is known but what it has sent since.
-            self._sequences = [each for each in self._sequences if not each.known]
+            new = [each for each in self._sequences if not each.known]
+            gone -= len(self._sequences) - len(new)
+            self._sequences = new
         surplus = max(0, len(self._sequences) - self._expected)
         self._sequences.sort(key=lambda each: each.at_ns)
         del self._sequences[:surplus]
         # Which ones they are is not known: one that was kept may be of a publisher that has gone.
-        self._surplus = surplus if none_stays else max(surplus, min(gone, len(self._sequences)))
+        self._surplus = max(surplus, min(gone, len(self._sequences)))
 
     def _found(self, number: int) -> bool:
         """Removes a number from the missing ones; returns whether it was one."""

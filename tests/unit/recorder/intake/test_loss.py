@@ -94,6 +94,19 @@ def test_a_publisher_that_was_there_beside_the_one_whose_place_it_takes_is_no_ga
     assert lost(counter, frozenset({"b"})) == 1
 
 
+def test_a_publisher_that_was_heard_once_before_another_took_its_place_is_no_gap(
+    counter: LossCounter,
+) -> None:
+    take(counter, [49, 50])
+    assert counter.collect(frozenset({"b"})) is None
+    take(counter, [1, 2])
+    assert counter.collect(frozenset({"b"})) is None
+    take(counter, [3, 1])
+    found = counter.collect(frozenset({"b"}))
+    assert found, "this one was started again unnoticed"
+    assert found.messages is None
+
+
 def test_two_publishers_of_which_one_leaves_before_the_graph_is_examined_are_no_gap() -> None:
     counter = LossCounter()
     counter.collect(ONE)
