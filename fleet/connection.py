@@ -8,7 +8,7 @@ What runs for long (`follow`, `pull`, `serve`) outlives the sessions.
 |---|---|
 | no server answers | every server once in random order, then a pause of 1 s to 60 s with jitter, for ever |
 | a server is silent | after 1 s the next one is tried beside it, and the first that answers is taken |
-| the hub does not accept the credentials | the same; `link.reason` is REFUSED |
+| the hub does not accept the credentials | the same; `link.reason` is REFUSED, also beside a silent one |
 | the connection is half-open, or its node silent | found by pings within 15 s, then as lost |
 | the connection is lost | what waits for an answer fails with UNREACHABLE; at once on to another server |
 | a node dies | as lost; until its streams have a leader again, they fail with NO_RESPONDERS or TIMEOUT |

@@ -13,7 +13,8 @@ from fleet.errors import HubError, HubReason, UnreachableError
 from fleet.session import Session
 
 NEXT_AFTER_S: Final = 1.0
-"""A server that has not answered after this time has the next one tried beside it.
+"""A server that has not answered after this time has the next one tried beside it; where there is no next one
+and another one refuses, it is not waited for any longer.
 
 More than the 250 ms of RFC 8305, because TLS and authentication are in it, and because the robots of a lost
 node come to the other ones all at once: these are slow then, and further attempts would make them slower.
@@ -55,9 +56,13 @@ async def _first(
         if left:
             attempts.append(asyncio.create_task(open_one(left.pop(0))))
             running.add(attempts[-1])
+        refused = worst.reason is HubReason.REFUSED
         ended, running = await asyncio.wait(
-            running, timeout=NEXT_AFTER_S if left else None, return_when=asyncio.FIRST_COMPLETED
+            running, timeout=NEXT_AFTER_S if left or refused else None, return_when=asyncio.FIRST_COMPLETED
         )
+        # Callers wait no longer than for the time-out of a silent one: they would not learn of the refusal.
+        if refused and not left and not ended:
+            break
         for attempt in ended:
             try:
                 attempt.result()

@@ -1,6 +1,7 @@
 """Several servers are tried side by side when they are silent, and one session is what comes of it."""
 
 import asyncio
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -118,6 +119,26 @@ async def test_a_refusal_says_more_than_silence() -> None:
         await servers.first("a", "b", "c")
     assert refused.value.reason is HubReason.REFUSED
     assert [server for server, _ in servers.tried] == ["a", "b", "c"], "another one may accept them"
+
+
+@in_virtual_time
+async def test_which_is_not_kept_back_until_a_silent_one_has_timed_out() -> None:
+    """The defect: callers that wait for 5 s reported that no server answers."""
+    for order in itertools.permutations("abc"):
+        servers = Servers(a=(0.1, RefusedError("revoked")))
+        begun_s = asyncio.get_running_loop().time()
+        with pytest.raises(RefusedError, match="revoked"):
+            await servers.first(*order)
+        assert len(servers.tried) == 3, "another one may accept them"
+        assert asyncio.get_running_loop().time() - begun_s < 3.5 * NEXT_AFTER_S
+        assert sorted(servers.ended) == ["b", "c"]
+
+
+@in_virtual_time
+async def test_one_that_is_slow_is_still_taken_where_the_others_refuse() -> None:
+    refusal = (0.1, RefusedError("not known yet"))
+    servers = Servers(a=refusal, b=refusal, c=(0.9 * NEXT_AFTER_S, None))
+    assert (await servers.first("a", "b", "c")).server == "c"
 
 
 @in_virtual_time
