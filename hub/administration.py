@@ -11,17 +11,15 @@
 | a server loses its disk | it knows the revocations of its nats.conf, and all after `apply` |
 """
 
-import asyncio
 import json
 import time
-from collections.abc import AsyncGenerator, Awaitable, Callable, Sequence
+from collections.abc import AsyncGenerator, Callable, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Final
 
-from common.backoff import Backoff
 from common.errors import UserError
 from common.private_files import write_all_private
 from fleet import names
@@ -31,14 +29,11 @@ from fleet.identity import Credentials, Permissions, new_user
 from hub import permissions, streams
 from hub.accounts import account_keys, account_tokens, add_accounts
 from hub.directory import HubDirectory, HubRecord, KeyName, Kind, User, check_name
+from hub.electing import once_elected
 
 _CONNECT_S: Final = 5.0
 """For a connection with one of the servers; a silent one is no reason to wait (fleet/opening.py)."""
 _PUSH_WITHIN_S: Final = 3.0
-_ELECTED_WITHIN_S: Final = 15.0
-"""A cluster that lost a server has a leader again by then (docs/fleet.md)."""
-_ELECTING: Final = (HubReason.NO_RESPONDERS, HubReason.NO_QUORUM, HubReason.TIMEOUT)
-"""What the hub answers meanwhile; nothing, while the lost server counts as the leader."""
 
 
 def move_people(directory: HubDirectory, name: Callable[[User], None]) -> None:
@@ -90,7 +85,7 @@ async def apply(directory: HubDirectory, limits: streams.StreamLimits | None = N
         for user in record.users:
             if user.kind == "robot":
                 if not user.revoked:
-                    await _once_elected(partial(streams.add_command_consumer, hub, user.name))
+                    await once_elected(partial(streams.add_command_consumer, hub, user.name))
                 await _list_robot(hub, user)
     return differences
 
@@ -117,7 +112,7 @@ async def enroll(
         user = record.user("robot", robot)
         assert user is not None  # noqa: S101  # it has just been issued
         async with _connected(directory) as hub:
-            await _once_elected(partial(streams.add_command_consumer, hub, robot))
+            await once_elected(partial(streams.add_command_consumer, hub, robot))
             await _list_robot(hub, user)
         # First: a key that exists and is not listed could never be revoked.
         directory.write(record)
@@ -183,8 +178,11 @@ async def usage(directory: HubDirectory) -> HubUse:
     """
     robots = [user.name for user in directory.read().users if user.kind == "robot"]
     async with _connected(directory) as hub:
-        uses = [await streams.use_of(hub, stream) for stream in streams.REPORTED]
-        counts = [(robot, await hub.count(names.EVENTS, names.event_subjects(robot))) for robot in robots]
+        uses = [await once_elected(partial(streams.use_of, hub, stream)) for stream in streams.REPORTED]
+        counts = [
+            (robot, await once_elected(partial(hub.count, names.EVENTS, names.event_subjects(robot))))
+            for robot in robots
+        ]
     return HubUse(tuple(uses), tuple(sorted(counts, key=lambda each: (-each[1], each[0]))))
 
 
@@ -208,7 +206,7 @@ async def purge(directory: HubDirectory, robot: str, *, recordings: bool) -> dic
     if recordings:
         subjects[f"KV_{names.RECORDINGS}"] = f"$KV.{names.RECORDINGS}.{robot}.>"
     async with _connected(directory) as hub:
-        return {stream: await streams.purge(hub, stream, each) for stream, each in subjects.items()}
+        return {stream: await _purge(hub, stream, each) for stream, each in subjects.items()}
 
 
 def operator_login(
@@ -325,28 +323,17 @@ async def _push_accounts(directory: HubDirectory, record: HubRecord) -> None:
                 raise HubError(HubReason.INVALID, f"the server refuses an account's token: {error}")
 
 
+async def _purge(hub: Hub, stream: str, subjects: str) -> int:
+    """Deletes messages of a stream as soon as it has a leader; returns how many there were."""
+    # By a call that is answered at once: a purge may take a minute, a second one would count what is left.
+    await once_elected(partial(hub.stream_info, stream))
+    return await streams.purge(hub, stream, subjects)
+
+
 async def _list_robot(hub: Hub, user: User) -> None:
-    """Puts a robot into the bucket that consoles read; raises a HubError, as `_once_elected`."""
+    """Puts a robot into the bucket that consoles read; raises a HubError, as `once_elected`."""
     entry = {"robot": user.name, "revoked": user.revoked is not None, "revoked_unix_s": user.revoked}
-    await _once_elected(partial(hub.put, names.ROBOTS, user.name, json.dumps(entry).encode()))
-
-
-async def _once_elected(work: Callable[[], Awaitable[None]]) -> None:
-    """Does what may be done twice; while the hub elects a leader for it, tries again.
-
-    Raises:
-        HubError: it does something else, or has elected none for _ELECTED_WITHIN_S.
-    """
-    retry, deadline_s = Backoff(0.1, 1.0), time.monotonic() + _ELECTED_WITHIN_S
-    while True:
-        try:
-            await work()
-        except HubError as error:
-            if error.reason not in _ELECTING or time.monotonic() > deadline_s:
-                raise
-            await asyncio.sleep(retry.next_s())
-        else:
-            return
+    await once_elected(partial(hub.put, names.ROBOTS, user.name, json.dumps(entry).encode()))
 
 
 @asynccontextmanager

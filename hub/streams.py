@@ -3,12 +3,13 @@
 import asyncio
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
-from common.backoff import Backoff
 from fleet import names
 from fleet.connection import Hub
 from fleet.errors import HubError, HubReason
+from hub.electing import once_elected
 
 _DAY_NS: Final = 86_400 * 1_000_000_000
 _MIB: Final = 1024 * 1024
@@ -78,7 +79,7 @@ async def set_up(hub: Hub, replicas: int, limits: StreamLimits = StreamLimits())
     """Makes the streams and buckets that are missing, and room in those that exist, where `limits` has more.
 
     Less room would cost messages, so it counts as a difference. Waits for nodes of a cluster that are still
-    joining, JOINING_S in all.
+    joining, and for leaders, JOINING_S in all.
 
     Returns:
         What differs in existing ones, as "fleet_events: max_bytes is 1, expected 2".
@@ -89,7 +90,8 @@ async def set_up(hub: Hub, replicas: int, limits: StreamLimits = StreamLimits())
     deadline_s = asyncio.get_running_loop().time() + JOINING_S
     differences: list[str] = []
     for name, config in stream_configs(replicas, limits).items():
-        differences += await _make_with_quorum(hub, name, config, limits.chosen(name), deadline_s)
+        make = partial(_make, hub, name, config, limits.chosen(name))
+        differences += await once_elected(make, deadline_s)
     return differences
 
 
@@ -161,22 +163,6 @@ async def add_command_consumer(hub: Hub, robot: str) -> None:
     }
     call = f"CONSUMER.CREATE.{names.COMMANDS}.{robot}.{subjects}"
     await hub.api(call, {"stream_name": names.COMMANDS, "config": config})
-
-
-async def _make_with_quorum(
-    hub: Hub, name: str, config: dict[str, Any], chosen: Mapping[str, int], deadline_s: float
-) -> list[str]:
-    """As `_make`, again and again while nodes or the leader are missing, up to a time of the event loop."""
-    backoff = Backoff(first_s=0.1, longest_s=2.0)
-    while True:
-        try:
-            return await _make(hub, name, config, chosen)
-        except HubError as error:
-            pause_s = backoff.next_s()
-            late = asyncio.get_running_loop().time() + pause_s > deadline_s
-            if error.reason not in (HubReason.NO_QUORUM, HubReason.TIMEOUT) or late:
-                raise
-        await asyncio.sleep(pause_s)
 
 
 async def _make(hub: Hub, name: str, config: dict[str, Any], chosen: Mapping[str, int]) -> list[str]:

@@ -1,56 +1,85 @@
-"""What the administration waits for while a node of the hub is lost, and for how long."""
+"""What the administration waits for while a node of the hub is lost."""
 
-import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any, cast
 
 import pytest
 
+from fleet import names
 from fleet.errors import HubError, HubReason
 from fleet.opening import NEXT_AFTER_S
 from hub import administration
+from hub.directory import HubDirectory, HubRecord, User
 from hub.receiver import relisting
+from tests.support.virtual_time import in_virtual_time
 
 
-class Work:
-    """Something that the hub refuses to do at first.
+class Electing:
+    """A hub whose streams have no leader yet: of each, nothing answers the first request."""
 
-    Args:
-        errors: of the first attempts, in their order.
-    """
+    def __init__(self) -> None:
+        self._led: set[str] = set()
+        self.purged: list[str] = []
 
-    def __init__(self, *errors: HubReason) -> None:
-        self._errors = list(errors)
-        self.attempts = 0
+    async def stream_info(self, stream: str) -> dict[str, Any]:
+        self._need_leader(stream)
+        return {"state": {"bytes": 1}, "config": {"max_bytes": 2}}
 
-    async def __call__(self) -> None:
-        self.attempts += 1
-        if self._errors:
-            raise HubError(self._errors.pop(0), "the hub does not do it")
+    async def count(self, stream: str, subjects: str) -> int:
+        self._need_leader(f"{stream} {subjects}")
+        return 7
 
+    async def api(self, call: str, _request: Any, _timeout_s: float) -> dict[str, Any]:
+        stream = call.removeprefix("STREAM.PURGE.")
+        self._need_leader(stream)
+        self.purged.append(stream)
+        return {"purged": 3}
 
-@pytest.mark.parametrize(
-    "reason", [HubReason.NO_RESPONDERS, HubReason.NO_QUORUM, HubReason.TIMEOUT], ids=lambda each: each.value
-)
-async def test_a_leader_that_is_being_elected_is_waited_for(reason: HubReason) -> None:
-    """Nothing answers while a silent node counts as the leader."""
-    work = Work(reason, reason)
-    await administration._once_elected(work)
-    assert work.attempts == 3
-
-
-async def test_other_errors_are_final() -> None:
-    work = Work(HubReason.FULL)
-    with pytest.raises(HubError, match="does not do it"):
-        await administration._once_elected(work)
-    assert work.attempts == 1
+    def _need_leader(self, what: str) -> None:
+        if what not in self._led:
+            self._led.add(what)
+            raise HubError(HubReason.TIMEOUT, "no answer from the hub within 5 s")
 
 
-async def test_without_a_leader_it_ends(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(administration, "_ELECTED_WITHIN_S", 0.2)
-    begun_s = time.monotonic()
-    with pytest.raises(HubError, match="does not do it") as ended:
-        await administration._once_elected(Work(*[HubReason.TIMEOUT] * 1000))
-    assert ended.value.reason is HubReason.TIMEOUT
-    assert time.monotonic() - begun_s >= 0.2
+class Directory:
+    """One of a hub with one robot."""
+
+    def read(self) -> HubRecord:
+        return HubRecord("lab", ("tls://hub:4222",), 3, users=(User("r1", "robot", ("key",)),))
+
+
+@pytest.fixture
+def electing(monkeypatch: pytest.MonkeyPatch) -> Electing:
+    hub = Electing()
+
+    @asynccontextmanager
+    async def connected(_directory: HubDirectory) -> AsyncIterator[Electing]:
+        yield hub
+
+    monkeypatch.setattr(administration, "_connected", connected)
+    return hub
+
+
+_DIRECTORY = cast("HubDirectory", Directory())
+
+
+@pytest.mark.usefixtures("electing")
+@in_virtual_time
+async def test_how_full_the_streams_are_is_read_when_there_is_a_leader() -> None:
+    """The defect: it failed, as `purge` did, although the other commands of the administration wait."""
+    use = await administration.usage(_DIRECTORY)
+    assert [each.ratio for each in use.streams] == [0.5] * 3
+    assert use.events == (("r1", 7),)
+
+
+@in_virtual_time
+async def test_a_purge_waits_for_a_leader_and_is_made_once(electing: Electing) -> None:
+    """Made again after a time-out, it would say of what the first one deleted that there was nothing."""
+    purged = await administration.purge(_DIRECTORY, "r1", recordings=True)
+    streams = [names.EVENTS, names.RESULTS, f"KV_{names.RECORDINGS}"]
+    assert purged == dict.fromkeys(streams, 3)
+    assert electing.purged == streams
 
 
 @pytest.mark.parametrize("patience_s", [administration._CONNECT_S, relisting._CONNECT_S])
