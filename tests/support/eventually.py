@@ -1,7 +1,8 @@
 """Waiting for a condition in a test that lives in an event loop."""
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -17,3 +18,15 @@ async def eventually(
         assert loop.time() < deadline, f"not within {within_s:g} s: {what}; last: {answer}"
         await asyncio.sleep(0.01)
     return answer
+
+
+@asynccontextmanager
+async def at_most(within_s: float, what: str) -> AsyncIterator[None]:
+    """A block that fails the test after `within_s`, with an AssertionError: a stall may explain that."""
+    try:
+        async with asyncio.timeout(within_s) as limit:
+            yield
+    except TimeoutError as error:
+        if not limit.expired():
+            raise
+        raise AssertionError(f"not within {within_s:g} s: {what}") from error

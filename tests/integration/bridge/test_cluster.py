@@ -14,7 +14,7 @@ from fleet.connection import Hub, Start, connect
 from fleet.errors import HubError
 from omniseer.fleet.v1.event_pb2 import EventBatch
 from tests.support.event_server import EventServer
-from tests.support.eventually import eventually
+from tests.support.eventually import at_most, eventually
 from tests.support.promise import keeps_async
 from tests.support.running_bridge import ROBOT, BridgeProgram, Received, bridge_program, received
 from tests.support.secure_hub import SecureHub, secure_hub
@@ -81,6 +81,7 @@ async def test_each_server_killed_in_turn_costs_no_event(
     assert len(found.events) == 3 * 2 * _EVENTS
 
 
+@pytest.mark.timeout(300)  # up to four attempts of 15 s each, after a cluster has started
 async def test_a_server_that_falls_silent_holds_events_up_no_longer(
     tmp_path: Path, secure: SecureHub, gateway: EventServer
 ) -> None:
@@ -97,7 +98,7 @@ async def test_a_server_that_falls_silent_holds_events_up_no_longer(
             try:
                 begun_unix_s = time.time()
                 gateway.happen(_EVENTS)
-                async with asyncio.timeout(60):
+                async with at_most(60, "the hub takes the events"):
                     taken_unix_s = await taken(hub, run, gateway.happened[run])
                 return taken_unix_s - begun_unix_s
             finally:

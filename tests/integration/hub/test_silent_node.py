@@ -65,6 +65,7 @@ def test_it_keeps_the_administration_from_nothing(
 
 
 @pytest.mark.timed
+@pytest.mark.timeout(300)  # up to four attempts, after a cluster has started
 async def test_a_revoked_robot_is_out_of_the_others_in_time(cluster: SecureHub) -> None:
     frozen = await asyncio.to_thread(_freeze_first, cluster)
     running = [node for node in range(3) if node != frozen]
@@ -89,6 +90,7 @@ async def test_a_revoked_robot_is_out_of_the_others_in_time(cluster: SecureHub) 
 
 
 @pytest.mark.timed
+@pytest.mark.timeout(300)  # up to four attempts of 15 s each, after a cluster has started
 def test_when_it_goes_on_it_learns_who_is_revoked(cluster: SecureHub) -> None:
     names_of_robots = (f"r{number}" for number in itertools.count())
 
