@@ -7,7 +7,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Sequence
 from contextlib import AsyncExitStack, ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -18,11 +18,13 @@ import pytest
 from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
 from grpc_health.v1.health_pb2_grpc import HealthStub
 
+from bench.siege.crowd import Crowd
 from common.addresses import bracketed
 from common.bind import bind_tcp
 from common.healthcheck import state_of
 from common.reasons import Reason
 from common.rpc import new_server
+from common.tasks import cancel
 from console.client import NotAllowed
 from gateway.access.role import Role
 from gateway.assembly import ThisRobot, build
@@ -33,6 +35,7 @@ from gateway.rpc.connections.admission import MAX_PENDING
 from omniseer.gateway.v1.robot_gateway_pb2 import GetSystemStatusRequest, WatchSystemStatusRequest
 from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
 from tests.support.detour import detour
+from tests.support.eventually import eventually
 from tests.support.free import free_tcp_port
 from tests.support.guarded_gateway import guarded_gateway, new_robot
 from tests.support.guarded_program import guarded_program
@@ -132,25 +135,36 @@ async def test_strangers_from_many_addresses_keep_no_operator_out(tmp_path: Path
             await until_at_most(opened, MAX_PENDING)
 
 
-async def test_nor_one_whose_address_the_gateway_has_never_heard_of(tmp_path: Path) -> None:
+@pytest.mark.timeout(360)  # five logins of a minute at the most
+async def test_an_address_never_heard_of_gets_in_while_strangers_keep_coming_back(tmp_path: Path) -> None:
     """Attempts to connect from there are dropped by chance; TCP repeats them, each time with better odds."""
     robot = new_robot(tmp_path)
     _, login = robot.add(Role.VIEWER)
-    strangers = [f"127.0.2.{number}" for number in range(1, 31)]
     async with guarded_gateway(robot), AsyncExitStack() as stack:
-        with connections(robot.port, 10, NOTHING, strangers) as opened:
-            # Then the gateway has seen how many they are.
-            await until_at_most(opened, MAX_PENDING)
-            for number in range(1, 6):
-                way = await stack.enter_async_context(detour(f"127.5.0.{number}", robot.port))
-                stub = RobotGatewayStub(replace(robot, port=way).channel())
-                status: Any = await stub.GetSystemStatus(
-                    GetSystemStatusRequest(),
-                    metadata=login.metadata(),
-                    timeout=COMES_THROUGH_WITHIN_S,
-                    wait_for_ready=True,
-                )
-                assert status.gateway_name
+        crowd = Crowd(("127.0.0.1", robot.port))
+        strangers = [
+            asyncio.create_task(crowd.drip(f"127.0.2.{number}")) for number in range(1, 31) for _ in range(10)
+        ]
+        stack.push_async_callback(cancel, strangers)
+        await eventually(tried_by(crowd), lambda tried: tried > len(strangers), "the gateway cuts some off")
+        for number in range(1, 6):
+            way = await stack.enter_async_context(detour(f"127.5.0.{number}", robot.port))
+            stub = RobotGatewayStub(replace(robot, port=way).channel())
+            status: Any = await stub.GetSystemStatus(
+                GetSystemStatusRequest(),
+                metadata=login.metadata(),
+                timeout=COMES_THROUGH_WITHIN_S,
+                wait_for_ready=True,
+            )
+            assert status.gateway_name
+        assert not any(each.done() for each in strangers), "they are still at it"
+
+
+def tried_by(crowd: Crowd) -> Callable[[], Awaitable[int]]:
+    async def tried() -> int:
+        return crowd.counts.tried
+
+    return tried
 
 
 async def test_watching_strangers_take_no_place_of_an_operator_and_leave_soon(
