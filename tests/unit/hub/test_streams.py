@@ -1,5 +1,6 @@
 """Making the hub's streams while its nodes are still joining, or elect a leader."""
 
+import asyncio
 from typing import Any
 
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from fleet import names
 from fleet.errors import HubError, HubReason
 from hub import streams
+from tests.support.virtual_time import in_virtual_time
 
 
 class _Joining:
@@ -37,6 +39,7 @@ async def made_by(hub: Any, *limits: streams.StreamLimits) -> list[str]:
     return await streams.set_up(hub, 3, *limits)
 
 
+@in_virtual_time
 async def test_nodes_that_are_still_joining_are_waited_for() -> None:
     hub = _Joining([no_quorum(), no_quorum(), no_quorum()])
     assert await made_by(hub) == []
@@ -44,18 +47,20 @@ async def test_nodes_that_are_still_joining_are_waited_for() -> None:
     assert created == list(streams.stream_configs(3))
 
 
+@in_virtual_time
 async def test_a_leader_that_answers_nothing_is_waited_for() -> None:
     """A node that stands still counts as the leader until the others have elected another one."""
     hub = _Joining([HubError(HubReason.TIMEOUT, "no answer from the hub within 5 s")])
     assert await made_by(hub) == []
 
 
-async def test_but_not_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(streams, "JOINING_S", 0.5)
+@in_virtual_time
+async def test_but_not_for_ever() -> None:
     hub = _Joining([no_quorum()] * 1000)
     with pytest.raises(HubError, match="peer offline"):
         await made_by(hub)
-    assert 2 <= len(hub.calls) <= 4
+    assert asyncio.get_running_loop().time() == pytest.approx(streams.JOINING_S)
+    assert streams.JOINING_S / 2 < len(hub.calls) < 2 * streams.JOINING_S, "about once a second"
 
 
 class _Made:
