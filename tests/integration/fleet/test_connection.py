@@ -193,9 +193,10 @@ async def test_a_silent_server_is_found_while_much_waits_to_be_sent(servers: Nat
                 await asyncio.shield(session.lost)
             return time.monotonic() - begun_s
         finally:
-            servers.thaw(0)
-            await cancel([sending])
+            # First: to a server that goes on, over a session that stands, it would send without a pause.
             await session.close()
+            await cancel([sending])
+            servers.thaw(0)
 
     await keeps_async(_FOUND_WITHIN_S, "s until a silent server is found", found_s)
 
