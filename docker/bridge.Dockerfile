@@ -4,7 +4,7 @@ ARG DEBIAN_IMAGE=debian:bookworm-slim
 
 FROM ${DEBIAN_IMAGE} AS system
 # The certificates: of stores whose authority the world knows (uploads.ca names any other). tzdata: the zones of
-# uploads.time_zone; where it is not in the base it would ask for the computer's.
+# uploads.time_zone; where the base lacks it, debconf would ask which of them is the computer's.
 RUN apt-get update \
  && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends ca-certificates python3 tini tzdata \
  && rm -rf /var/lib/apt/lists/* /var/cache/apt/*

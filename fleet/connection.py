@@ -249,7 +249,7 @@ class Hub:
                         place = Start.after(message.sequence)
                         yield message
             except HubError:
-                await self._pause(pause)
+                await self._pause_with_jitter(pause)
 
     async def last(
         self, stream: str, subjects: str, timeout_s: float = REQUEST_TIMEOUT_S
@@ -280,7 +280,7 @@ class Hub:
                         pause.reset()
                         yield delivery
             except HubError:
-                await self._pause(pause)
+                await self._pause_with_jitter(pause)
 
     async def request(self, subject: str, payload: bytes, timeout_s: float = REQUEST_TIMEOUT_S) -> bytes:
         """Sends a request to another program and returns its answer.
@@ -456,7 +456,8 @@ class Hub:
             raise UnreachableError(self._link.text or "there is no connection to the hub yet")
         return self._session
 
-    async def _pause(self, backoff: Backoff) -> None:
+    async def _pause_with_jitter(self, backoff: Backoff) -> None:
+        """As `pause`, between half and all of the next pause: a fleet does not come back in step."""
         await self.pause(backoff.next_s() * random.uniform(0.5, 1.0))  # noqa: S311
 
 

@@ -167,8 +167,9 @@ class _Client(Client):
         await super()._process_pong()
 
     async def _send_ping(self, future: asyncio.Future[bool] | None = None) -> None:
-        # The library writes PING past what still waits for its flusher; the PONG would not prove that. One of
-        # those that find a silent server has nothing to prove: it would wait for what that does not take.
+        # The library writes PING past what still waits for its flusher; to a flush the PONG is to prove that
+        # the server has that, too. A ping without a future only looks for a silent server: it does not wait
+        # until that has taken the rest.
         if future is not None:
             await self._flush_pending(force_flush=True)
         await super()._send_ping(future)
