@@ -61,13 +61,20 @@ class SharedRobot:
         Args:
             count: how many.
             viewers_target: how the viewer reaches the gateway; by default as the driver does.
+
+        Raises:
+            AssertionError: a stop has failed, or a call, or the driver's session has ended: this process may
+                have stood still for longer than either allows (tests.support.undisturbed).
         """
         operator = AsyncGatewayClient(self.target, credentials=self.driver)
         onlooker = AsyncGatewayClient(viewers_target or self.target, credentials=self.viewer)
-        async with operator, onlooker:
-            await _make_available(operator)
-            async with operator.drive(BY_EYE) as session:
-                return [await self._stop(onlooker, operator, session) for _ in range(count)]
+        try:
+            async with operator, onlooker:
+                await _make_available(operator)
+                async with operator.drive(BY_EYE) as session:
+                    return [await self._stop(onlooker, operator, session) for _ in range(count)]
+        except GatewayError as error:
+            raise AssertionError(f"a robot that is driven and stopped: {error}") from error
 
     async def _stop(
         self, viewer: AsyncGatewayClient, driver: AsyncGatewayClient, session: DriveSession
@@ -120,9 +127,15 @@ async def _stop_in_motion(
         try:
             await driver.reset_stop(stopped.stop.stop_id)
         except GatewayError:  # The release is on its way, or it is reset already.
-            stop = (await driver.status()).teleop.stop
-            return stop is None or stop.stop_id != stopped.stop.stop_id
+            return await is_gone()
         return True
+
+    async def is_gone() -> bool:
+        try:
+            stop = (await driver.status()).teleop.stop
+        except GatewayError:  # Late: the reset is tried again.
+            return False
+        return stop is None or stop.stop_id != stopped.stop.stop_id
 
     await eventually(is_reset, bool, "the stop is reset", RESET_WITHIN_S)
     return Stopped(base.stopped_after_s(began_s), answered_s)
