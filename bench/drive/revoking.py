@@ -14,8 +14,7 @@ from console.robots.login import parse_login
 from gateway.access.credential import Kind
 from gateway.access.credential_admin import CredentialRequest
 from gateway.access.role import Role
-from tests.support.driven_robot import BY_EYE, in_motion
-from tests.support.eventually import eventually
+from tests.support.driven_robot import BY_EYE, in_motion, make_available
 from tests.support.guarded_program import Guarded, guarded_program
 from tests.support.heard import Base
 
@@ -54,7 +53,7 @@ def moved_ms(ground: Ground) -> float:
 
 async def _moved_s(gateway: Guarded, base: Base, driver: Credentials, credential_id: str) -> float:
     async with AsyncGatewayClient(gateway.target, credentials=gateway.own) as admin:
-        await _make_available(admin)
+        await make_available(admin)
         async with (
             AsyncGatewayClient(gateway.target, credentials=driver) as client,
             client.drive(BY_EYE) as session,
@@ -68,15 +67,3 @@ async def _moved_s(gateway: Guarded, base: Base, driver: Credentials, credential
             if not isinstance(session.error, NotAllowed):
                 raise MeasurementError(f"the session did not end by the revocation: {session.error!r}")
             return base.stopped_after_s(began_s)
-
-
-async def _make_available(admin: AsyncGatewayClient) -> None:
-    """Resets the stop of the round before, once driving is enabled."""
-
-    async def free() -> bool:
-        teleop = (await admin.status()).teleop
-        if teleop.enabled and teleop.stop:
-            await admin.reset_stop(teleop.stop.stop_id)
-        return teleop.enabled and not teleop.stop and not teleop.holder
-
-    await eventually(free, bool, "the robot is free")

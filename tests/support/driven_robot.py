@@ -13,7 +13,6 @@ from console.client import (
     DriveOptions,
     DrivePhase,
     DriveSession,
-    GatewayError,
     Supervision,
 )
 from drive.config import DriveSettings
@@ -21,7 +20,7 @@ from tests.support.driving import BEHIND_THE_MUX
 from tests.support.eventually import eventually
 from tests.support.gateway_program import GatewayProgram, gateway_program
 from tests.support.heard import Base
-from tests.support.lost_worker import ready_after_a_loss
+from tests.support.lost_worker import LOST_BY, RESET_WITHIN_S, ready_after_a_loss, without_stop
 from tests.support.ros import simulated_robot
 from tests.support.running_drive import RunningDrive, listening_base, running_drive
 from tests.support.undisturbed import (
@@ -165,6 +164,7 @@ async def in_motion(
     speed_mps: float,
     *,
     input_device: str = "",
+    resets: str = LOST_BY,
 ) -> None:
     """Holds anew until base and driver have motion; a busy machine may take several attempts.
 
@@ -177,6 +177,7 @@ async def in_motion(
         base: what moves.
         speed_mps: straight ahead.
         input_device: what is held; by default the session's own.
+        resets: whose stops are reset, as of `without_stop`.
     """
     attempts = 0
 
@@ -184,7 +185,7 @@ async def in_motion(
         nonlocal attempts
         if attempts % _ATTEMPT == 0:
             session.release()
-            await ready_after_a_loss(client, session)
+            await ready_after_a_loss(client, session, resets)
         attempts += 1
         session.hold(speed_mps, input_device=input_device)
         return base.moves and session.state is not None and session.state.phase is DrivePhase.DRIVING
@@ -196,19 +197,19 @@ async def in_motion(
 async def available(robot: DrivenRobot) -> AsyncIterator[AsyncGatewayClient]:
     """A client of a robot that is not stopped."""
     async with AsyncGatewayClient(robot.target) as client:
-
-        async def free() -> bool:
-            try:
-                teleop = (await client.status()).teleop
-                if teleop.stop:
-                    await client.reset_stop(teleop.stop.stop_id)
-            except GatewayError:
-                return False
-            # The drive program's word: the gateway knows of the end of a session before it does.
-            return teleop.phase is DrivePhase.AVAILABLE and not teleop.holder and not teleop.stop
-
-        await eventually(free, bool, "the robot is free")
+        await make_available(client)
         yield client
+
+
+async def make_available(client: AsyncGatewayClient) -> None:
+    """Waits until driving is enabled and the robot is free, and resets what stops it."""
+
+    async def is_free() -> bool:
+        teleop = await without_stop(client)
+        # The phase is the drive program's word: the gateway knows of the end of a session before it does.
+        return bool(teleop and teleop.phase is DrivePhase.AVAILABLE and teleop.enabled and not teleop.holder)
+
+    await eventually(is_free, bool, "the robot is free", RESET_WITHIN_S)
 
 
 async def free(robot: DrivenRobot) -> None:

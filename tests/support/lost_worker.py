@@ -1,9 +1,10 @@
-"""The stop that the drive program leaves when its worker is lost, as an operator sees it."""
+"""The stop that the drive program leaves when its worker is lost, as an operator sees it, and its reset."""
 
 from contextlib import suppress
 from typing import Final
 
 from console.client import AsyncGatewayClient, DriveSession, GatewayError, Refused
+from console.client.results import Teleop
 from tests.support.eventually import eventually
 
 LOST_BY: Final = "robot-drive"
@@ -13,28 +14,40 @@ RESET_WITHIN_S: Final = 30.0
 """A new worker takes seconds to start, and then some more to know what else commands the robot."""
 
 
-async def reset_after_a_loss(client: AsyncGatewayClient) -> None:
-    """Resets a stop that the drive program has made itself; one of a caller stays."""
-
-    async def is_reset() -> bool:
-        # It may not be known yet what else commands the robot, and a link that loses packets delays calls.
-        with suppress(GatewayError):
-            stop = (await client.status()).teleop.stop
-            if stop is None or stop.by != LOST_BY:
-                return True
-            await client.reset_stop(stop.stop_id)
-        return False
-
-    await eventually(is_reset, bool, "the stop is reset that a lost worker has left", RESET_WITHIN_S)
+ANY: Final = ""
+"""Whatever stops the robot."""
 
 
-async def ready_after_a_loss(client: AsyncGatewayClient, session: DriveSession) -> None:
-    """Waits until a hold would move the robot, or for a while; resets a stop as `reset_after_a_loss` does.
+async def without_stop(client: AsyncGatewayClient, by: str = ANY) -> Teleop | None:
+    """Returns driving, as the status has it without a stop; resets one, and returns None then.
+
+    None also where the robot does not say, or does not reset it: it may not be known yet what else commands
+    the robot, and a link that loses packets delays calls.
+
+    Args:
+        client: of an operator.
+        by: whose stops are reset; one of another stays.
+    """
+    with suppress(GatewayError):
+        teleop = (await client.status()).teleop
+        if teleop.stop is None or by not in {ANY, teleop.stop.by}:
+            return teleop
+        await client.reset_stop(teleop.stop.stop_id)
+    return None
+
+
+async def reset_after_a_loss(client: AsyncGatewayClient, by: str = LOST_BY) -> None:
+    """Resets a stop that the drive program has made itself, or others as `without_stop`."""
+    await eventually(lambda: without_stop(client, by), bool, "the stop is reset", RESET_WITHIN_S)
+
+
+async def ready_after_a_loss(client: AsyncGatewayClient, session: DriveSession, by: str = LOST_BY) -> None:
+    """Waits until a hold would move the robot, or for a while; resets stops as `reset_after_a_loss` does.
 
     Raises:
         GatewayError: the session has ended.
     """
-    await reset_after_a_loss(client)
+    await reset_after_a_loss(client, by)
     try:
         await session.ready(_READY_WITHIN_S)
     except Refused:  # The next worker may be lost as well.

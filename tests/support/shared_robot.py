@@ -11,11 +11,11 @@ from console.client import AsyncGatewayClient, Credentials, DriveSession, Gatewa
 from gateway.access.credential import Kind
 from gateway.access.credential_admin import CredentialRequest
 from gateway.access.role import Role
-from tests.support.driven_robot import BY_EYE, held, in_motion
+from tests.support.driven_robot import BY_EYE, held, in_motion, make_available
 from tests.support.eventually import eventually
 from tests.support.guarded_program import guarded_program
 from tests.support.heard import Base
-from tests.support.lost_worker import RESET_WITHIN_S
+from tests.support.lost_worker import ANY, RESET_WITHIN_S
 from tests.support.running_drive import RunningDrive
 
 SPEED_MPS: Final = 0.1
@@ -43,6 +43,7 @@ class SharedRobot:
     Attributes:
         target: of the gateway, which serves no one without a login.
         base: behind the drive program.
+        drive: the drive program.
         driver: an operator's login.
         viewer: a viewer's login.
         crowd: the file of another viewer's login, for programs.
@@ -70,7 +71,7 @@ class SharedRobot:
         onlooker = AsyncGatewayClient(viewers_target or self.target, credentials=self.viewer)
         try:
             async with operator, onlooker:
-                await _make_available(operator)
+                await make_available(operator)
                 async with operator.drive(BY_EYE) as session:
                     return [await self._stop(onlooker, operator, session) for _ in range(count)]
         except GatewayError as error:
@@ -116,7 +117,8 @@ async def _stop_in_motion(
     viewer: AsyncGatewayClient, driver: AsyncGatewayClient, session: DriveSession, base: Base
 ) -> Stopped:
     """Stops the robot while its driver holds; they release, and reset that."""
-    await in_motion(driver, session, base, SPEED_MPS)
+    # The stop of an attempt that a lost worker has spoilt may be latched, also by one of the two.
+    await in_motion(driver, session, base, SPEED_MPS, resets=ANY)
     async with held(session, SPEED_MPS):
         began_s = time.monotonic()
         stopped = await viewer.stop_robot()
@@ -143,18 +145,3 @@ async def _stop_in_motion(
 
 async def _rests(base: Base) -> bool:
     return not base.moves
-
-
-async def _make_available(operator: AsyncGatewayClient) -> None:
-    """Resets what an earlier driver has left, once driving is enabled."""
-
-    async def free() -> bool:
-        try:
-            teleop = (await operator.status()).teleop
-            if teleop.enabled and teleop.stop:
-                await operator.reset_stop(teleop.stop.stop_id)
-        except GatewayError:  # It is not known yet what else commands the robot.
-            return False
-        return teleop.enabled and not teleop.stop and not teleop.holder
-
-    await eventually(free, bool, "the robot is free", RESET_WITHIN_S)
