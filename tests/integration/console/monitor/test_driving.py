@@ -428,9 +428,14 @@ def under_suggestions_of_a_file_dialog(seat: Seat) -> None:
     suggested = seat.window.recording.folder = Path(os.environ["XDG_CONFIG_HOME"])
     (suggested / "lab").mkdir(exist_ok=True)
     under_a_file_dialog(seat)
+    dialog = seat.window.recording.folder_dialog
+    assert dialog
 
     def suggests() -> bool:
         if QApplication.activePopupWidget() is None:
+            # Names that could not be listed in time for a letter are suggested for the same one, not for two.
+            for field in dialog.findChildren(QLineEdit):
+                field.clear()
             QTest.keyClick(QGuiApplication.focusWindow(), Qt.Key.Key_L)
             let_pass(0.2)
         return QApplication.activePopupWidget() is not None
