@@ -1,5 +1,6 @@
 """A terminal for a program under test: what is typed, what is to be seen, and the manners it is left with."""
 
+import codecs
 import fcntl
 import os
 import pty
@@ -69,6 +70,8 @@ class Terminal:
         extra: dict[str, str] | None = None,
     ) -> None:
         self.drawn = ""
+        self._decoder = codecs.getincrementaldecoder("utf-8")()
+        """Keeps the beginning of a character of which the rest was not written yet."""
         # The second end stays open, so that the terminal outlives the program.
         self._master, self._slave = pty.openpty()
         self.resize(rows, columns)
@@ -101,7 +104,7 @@ class Terminal:
             data = os.read(self._master, 65536)
             if not data:
                 break
-            self.drawn += data.decode()
+            self.drawn += self._decoder.decode(data)
         return self.drawn
 
     def lines(self) -> list[str]:
