@@ -247,6 +247,30 @@ def test_the_folder_of_exports_may_be_one_that_is_yet_to_be_made(
     assert window.recording.folder == folder
 
 
+@pytest.mark.parametrize(
+    ("typed", "why"),
+    [("a file", "a file, not a folder"), ("a file/below", "Not a directory"), ("x" * 300, "name too long")],
+    ids=["a file", "below a file", "a long name"],
+)
+def test_a_folder_that_is_not_taken_has_a_reason_in_the_dialog(
+    window: MonitorWindow, tmp_path: Path, typed: str, why: str
+) -> None:
+    (tmp_path / "a file").touch()
+    window.recording.folder = tmp_path
+    window.recording.choose_folder()
+    dialog = until(lambda: window.recording.folder_dialog, "the dialog")
+    (field,) = dialog.findChildren(QLineEdit)
+    field.setText(str(tmp_path / typed))
+    assert not dialog.refusal.isVisible()
+    dialog.accept()
+    until(dialog.refusal.isVisible, "the reason")
+    assert why in dialog.refusal.text()
+    assert window.recording.folder_dialog is dialog, "another folder may be chosen"
+    dialog.reject()
+    until(lambda: window.recording.folder_dialog is None, "it is answered")
+    assert window.recording.folder == tmp_path
+
+
 def test_everything_has_a_name_and_can_be_reached_by_keys(window: MonitorWindow) -> None:
     tab = tab_of(window)
     for kind in (QAbstractButton, QComboBox, QLineEdit, QListWidget, QProgressBar):
