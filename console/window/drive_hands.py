@@ -168,10 +168,16 @@ class DriveHands(QObject):
 
     def _is_ours(self, watched: QObject) -> bool:
         """Whether an object belongs to this window, or to a menu or dialog of it."""
-        each: QObject | None = watched
-        while each is not None and each is not self._window:
-            each = each.parent() or _field_of(each)
-        return each is self._window
+        outermost = self._outermost(watched)
+        # Once: what passes its focus on to a part of its own would lead back to itself.
+        return self._window in (outermost, self._outermost(_field_of(outermost)))
+
+    def _outermost(self, watched: QObject | None) -> QObject | None:
+        """Returns this window where it is around an object, else the last one that is; None for None."""
+        each = watched
+        while each is not None and each is not self._window and (parent := each.parent()):
+            each = parent
+        return each
 
     def _counts(self) -> bool:
         """Whether what is held in this window counts."""
@@ -209,7 +215,7 @@ class DriveHands(QObject):
             self._driver.hold(steering, "gamepad" if by_pad else "keyboard")
 
 
-def _field_of(watched: QObject) -> QObject | None:
+def _field_of(watched: QObject | None) -> QObject | None:
     """Returns the text field of a list of suggestions, which has no parent; None for anything else."""
     return watched.focusProxy() if isinstance(watched, QWidget) else None
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QPushButton, QStyledItemDelegate, QWidget
 
@@ -266,6 +266,17 @@ def test_the_times_of_events_have_their_zone_above_them(desk_work: Desk) -> None
     until(lambda: zone.text() == "Times: UTC+09:00", "the zone")
     assert zone.isVisible()
     assert zone.fontMetrics().horizontalAdvance(zone.text()) <= zone.contentsRect().width(), "it is elided"
+
+
+def test_what_passes_its_focus_on_to_a_part_of_its_own_belongs_to_no_window(desk_work: Desk) -> None:
+    alone = QWidget()
+    alone.setFocusProxy(QPushButton(alone))
+    for kind in (QEvent.Type.FocusOut, QEvent.Type.WindowDeactivate):
+        QApplication.sendEvent(alone, QEvent(kind))
+    hands = desk_work.window.driving.hands
+    assert not hands._is_ours(alone)
+    alone.setFocusProxy(desk_work.window.preview.switch)
+    assert hands._is_ours(alone), "as the suggestions for a field of this window"
 
 
 def test_a_hundred_faults_do_not_burst_the_window(desk_work: Desk) -> None:
