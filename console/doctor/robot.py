@@ -152,6 +152,8 @@ _INHIBITED: Final = {
     DriveInhibit.DRIVE_LOST: "Start or restart robot-drive on the robot",
 }
 """What to do where the driver's own program can't help."""
+_OF_THE_LAST_DRIVER: Final = frozenset({DriveInhibit.ACCESS_ENDED})
+"""What stays until the next session, and does not keep that from beginning."""
 
 
 def driving_findings(status: SystemStatus) -> Iterator[Finding]:
@@ -184,7 +186,8 @@ def _obstacles(teleop: Teleop) -> Iterator[Finding]:
 def _can_be_driven(status: SystemStatus) -> bool:
     """Returns whether nothing is known that keeps the robot from being driven, its faults included."""
     faulted = any(fault.active and fault.id.startswith(_OF_DRIVING) for fault in status.faults)
-    return status.teleop.enabled and not status.teleop.inhibits and not faulted
+    inhibits = set(status.teleop.inhibits) - _OF_THE_LAST_DRIVER
+    return status.teleop.enabled and not inhibits and not faulted
 
 
 def _base_timeout(timeout_ms: int | None) -> Finding:

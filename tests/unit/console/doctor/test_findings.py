@@ -280,6 +280,15 @@ def test_a_robot_that_moves_for_no_driver_is_never_found_good(
     assert [found.verdict for found in of_driving(double)] == [Verdict.NOTE]
 
 
+def test_a_driver_who_has_lost_access_keeps_no_other_from_driving(double: GatewayDouble) -> None:
+    teleop = double.status.teleop
+    teleop.state, teleop.enabled = states.TELEOP_ENABLED, True
+    teleop.inhibits.append(teleop_pb2.DRIVE_INHIBIT_ACCESS_ENDED)
+    assert [found.verdict for found in of_driving(double)] == [Verdict.GOOD]
+    teleop.inhibits.append(teleop_pb2.DRIVE_INHIBIT_ROBOT_STOP)
+    assert [found.verdict for found in of_driving(double)] == [Verdict.NOTE]
+
+
 def test_no_fault_of_driving_stands_beside_a_robot_that_can_be_driven(double: GatewayDouble) -> None:
     teleop = double.status.teleop
     teleop.state, teleop.enabled = states.TELEOP_ENABLED, True

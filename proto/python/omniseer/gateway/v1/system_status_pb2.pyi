@@ -335,8 +335,8 @@ class TeleopStatus(_message.Message):
     def inhibits(self) -> _containers.RepeatedScalarFieldContainer[_teleop_pb2.DriveInhibit.ValueType]:
         """Why the robot does not move for a driver. The robot's own reasons stand also while no one drives:
         DRIVE_INHIBIT_ROBOT_STOP and _BASE_ABSENT, _OUTRANKED while the robot is stopped or coming to rest, and
-        _DRIVE_LOST. Empty when nothing is in the way; from a robot of an earlier release also without a driver,
-        whatever is.
+        _DRIVE_LOST. So does _ACCESS_ENDED, of the driver before, until the next session. Empty when nothing is in
+        the way. A robot of an earlier release leaves it empty without a driver, whatever is in the way.
         """
 
     @_builtins.property
