@@ -1,10 +1,11 @@
 """Choosing a folder beside a window that goes on to work: its STOP above all."""
 
+import os
 from pathlib import Path
 from stat import S_ISDIR
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QDialog, QFileDialog, QGridLayout, QWidget
+from PySide6.QtCore import QDir, Qt
+from PySide6.QtWidgets import QDialog, QFileDialog, QGridLayout, QLineEdit, QWidget
 
 from console.window.labels import WrappedLabel, set_text
 
@@ -37,19 +38,32 @@ class FolderDialog(QFileDialog):
 
     def accept(self) -> None:
         """Takes the folder, also one that does not exist: Qt would refuse that in a modal box."""
-        name = next(iter(self.selectedFiles()), "")
+        name = self._named()
         try:
             is_folder = S_ISDIR(Path(name).stat().st_mode)
         except FileNotFoundError:
-            self.fileSelected.emit(name)
-            self.done(QDialog.DialogCode.Accepted)
+            is_folder = True
         except OSError as error:
             self._refuse(f"This folder can't be used: {error.strerror}")
+            return
+        if is_folder:
+            self.fileSelected.emit(name)
+            self.done(QDialog.DialogCode.Accepted)
         else:
-            if is_folder:
-                super().accept()
-            else:
-                self._refuse("This is a file, not a folder")
+            self._refuse("This is a file, not a folder")
+
+    def _named(self) -> str:
+        """Returns the folder in the field, else the one marked in the list, else the one that is listed.
+
+        While a path is typed, Qt may mark the folder above it in the list.
+        """
+        # Looked for anew: a list of suggestions that goes takes PySide's object for the field along.
+        (field,) = self.findChildren(QLineEdit)
+        if typed := field.text():
+            # Path.expanduser raises where there is no such person.
+            typed = os.path.expanduser(typed)  # noqa: PTH111
+            return QDir.cleanPath(self.directory().absoluteFilePath(typed))
+        return next(iter(self.selectedFiles()), self.directory().absolutePath())
 
     def _refuse(self, why: str) -> None:
         set_text(self.refusal, f"{why}. Choose another one, or type the name of one that is to be made")

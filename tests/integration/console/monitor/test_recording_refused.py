@@ -28,7 +28,7 @@ from console.window.recordings_tab import RecordingsTab
 from console.window.side_panel import TABS
 from omniseer.gateway.v1 import recording_pb2 as pb
 from tests.support.gateway_double import GatewayDouble, serving
-from tests.support.qt import press, until
+from tests.support.qt import let_pass, press, until
 from tests.support.recorder_double import CHUNK_BYTES, RecorderDouble
 from tests.support.recording_gateway import recording_robot
 
@@ -269,6 +269,26 @@ def test_a_folder_that_is_not_taken_has_a_reason_in_the_dialog(
     dialog.reject()
     until(lambda: window.recording.folder_dialog is None, "it is answered")
     assert window.recording.folder == tmp_path
+
+
+def test_the_folder_is_the_one_in_the_field_also_after_a_refusal(
+    window: MonitorWindow, tmp_path: Path
+) -> None:
+    """Qt may have the folder above it marked in the list by then, and would take that."""
+    window.recording.folder = tmp_path
+    window.recording.choose_folder()
+    dialog = until(lambda: window.recording.folder_dialog, "the dialog")
+    until(dialog.isActiveWindow, "it has the keys")
+    for name in ("x" * 300, "new"):
+        (field,) = dialog.findChildren(QLineEdit)
+        field.setFocus()
+        until(field.hasFocus, "its field has them")
+        field.selectAll()
+        QTest.keyClicks(field, str(tmp_path / name))
+        let_pass(0.3)
+        dialog.accept()
+    until(lambda: window.recording.folder_dialog is None, "it is answered")
+    assert window.recording.folder == tmp_path / "new"
 
 
 def test_everything_has_a_name_and_can_be_reached_by_keys(window: MonitorWindow) -> None:
