@@ -18,18 +18,25 @@ class Stalls:
     What holds up this process holds up whatever a test notes in it, too: the time of an arrival for example.
     Where the host stops a single processor of this virtual machine, it may be a program of the robot that
     stands still.
-
-    Attributes:
-        longest_s: how late a thread has run at most.
     """
 
     def __init__(self) -> None:
-        self.longest_s = 0.0
+        self._noted_s: dict[int, float] = {}
+        """How late the thread of each processor has run at most."""
+        self._due_s: dict[int, float] = {}
+        """When each of them is to run next."""
         self._stop = threading.Event()
         self._threads = [
             threading.Thread(target=self._look, args=[processor], name=f"stalls-{processor}", daemon=True)
             for processor in sorted(os.sched_getaffinity(0))
         ]
+
+    @property
+    def longest_s(self) -> float:
+        """How late a thread has run at most, or is now: who asks may run again before it does."""
+        now_s = time.monotonic()
+        late_s = [now_s - due_s for due_s in list(self._due_s.values())]
+        return max(0.0, *late_s, *list(self._noted_s.values()))
 
     def __enter__(self) -> Self:
         for thread in self._threads:
@@ -45,8 +52,10 @@ class Stalls:
 
     def _look(self, processor: int) -> None:
         os.sched_setaffinity(0, {processor})  # of this thread
-        due_s = time.monotonic() + _EVERY_S
-        while not self._stop.wait(_EVERY_S):
+        now_s, stopped = time.monotonic(), False
+        while not stopped:
+            due_s = self._due_s[processor] = now_s + _EVERY_S
+            stopped = self._stop.wait(_EVERY_S)
             now_s = time.monotonic()
-            self.longest_s = max(self.longest_s, now_s - due_s)
-            due_s = now_s + _EVERY_S
+            self._noted_s[processor] = max(self._noted_s.get(processor, 0.0), now_s - due_s)
+        del self._due_s[processor]

@@ -197,7 +197,8 @@ class Robot:
 
     def end(self) -> None:
         subprocess.run(
-            ["docker", "compose", "--profile", "*", "down", "--remove-orphans", "--volumes", "--timeout", "1"],
+            ["docker", "compose", "--profile", "*", "down", "--remove-orphans", "--volumes",
+             "--timeout", "1"],
             cwd=self.directory, capture_output=True, timeout=120, check=False,
         )  # fmt: skip
         self.tags.add("before-9.1.0")

@@ -5,6 +5,7 @@ import ctypes
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
@@ -172,6 +173,13 @@ def test_a_process_that_stands_still_is_noticed() -> None:
     with Stalls() as stalls:
         ctypes.PyDLL(None).usleep(150_000)  # of a library for Python's own functions: no other thread runs
     assert stalls.longest_s > 0.1
+
+
+def test_a_stall_that_ends_as_it_is_asked_for_is_noticed() -> None:
+    """The thread that looks is to have run a second ago, and has not yet run again."""
+    stalls = Stalls()
+    vars(stalls)["_due_s"][0] = time.monotonic() - 1.0
+    assert stalls.longest_s >= 1.0
 
 
 @pytest.mark.parametrize("processor", sorted(os.sched_getaffinity(0)))
