@@ -26,20 +26,24 @@ class Stalls:
         self._due_s: dict[int, float] = {}
         """When each of them is to run next."""
         self._stop = threading.Event()
-        self._threads = [
-            threading.Thread(target=self._look, args=[processor], name=f"stalls-{processor}", daemon=True)
+        self._threads = {
+            processor: threading.Thread(
+                target=self._look, args=[processor], name=f"stalls-{processor}", daemon=True
+            )
             for processor in sorted(os.sched_getaffinity(0))
-        ]
+        }
 
     @property
     def longest_s(self) -> float:
         """How late a thread has run at most, or is now: who asks may run again before it does."""
         now_s = time.monotonic()
         late_s = [now_s - due_s for due_s in list(self._due_s.values())]
-        return max(0.0, *late_s, *list(self._noted_s.values()))
+        return max([0.0, *late_s, *list(self._noted_s.values())])
 
     def __enter__(self) -> Self:
-        for thread in self._threads:
+        for processor, thread in self._threads.items():
+            # Before it runs: one that does not begin to is late, too.
+            self._due_s[processor] = time.monotonic() + _EVERY_S
             thread.start()
         return self
 
@@ -47,7 +51,7 @@ class Stalls:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._stop.set()
-        for thread in self._threads:
+        for thread in self._threads.values():
             thread.join(_END_S)
 
     def _look(self, processor: int) -> None:

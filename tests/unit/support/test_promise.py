@@ -175,6 +175,10 @@ def test_a_process_that_stands_still_is_noticed() -> None:
     assert stalls.longest_s > 0.1
 
 
+def test_before_anything_has_run_there_was_no_stall() -> None:
+    assert Stalls().longest_s == 0.0
+
+
 def test_a_stall_that_ends_as_it_is_asked_for_is_noticed() -> None:
     """The thread that looks is to have run a second ago, and has not yet run again."""
     stalls = Stalls()
