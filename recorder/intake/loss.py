@@ -96,10 +96,8 @@ class LossCounter:
         for each in self._sequences:
             if each.last == number and each.published_ns == published_ns > 0:
                 return  # The same once more: what a transient local publisher keeps for late subscribers.
-            if each.last == number - 1:
-                below = each
-                break
-            if each.last < number and (below is None or each.last > below.last):
+            # Of two that are as near the newer one: the other may be of a publisher that has gone.
+            if each.last < number and (below is None or (each.last, each.at_ns) > (below.last, below.at_ns)):
                 below = each
         if below and below.last == number - 1:
             below.last, below.at_ns, below.published_ns = number, at_ns, published_ns

@@ -94,6 +94,22 @@ def test_a_publisher_that_was_there_beside_the_one_whose_place_it_takes_is_no_ga
     assert lost(counter, frozenset({"b"})) == 1
 
 
+@pytest.mark.parametrize(("former", "until"), [(5, 10), (300, 900)])
+def test_a_publisher_that_passes_where_the_one_whose_place_it_takes_had_come_is_no_gap(
+    counter: LossCounter, former: int, until: int
+) -> None:
+    """The defect: what it sent from there on was taken for the former one's, and forgotten with it."""
+    take(counter, range(1, former + 1))
+    assert counter.collect(ONE) is None
+    for number in range(1, until + 1):
+        counter.take(number, 10 * former + number)
+    assert counter.collect(frozenset({"b"})) is None
+    counter.take(until + 1, 10 * former + until + 1)
+    assert counter.collect(frozenset({"b"})) is None
+    counter.take(until + 3, 10 * former + until + 3)
+    assert lost(counter, frozenset({"b"})) == 1
+
+
 def test_a_publisher_that_was_heard_once_before_another_took_its_place_is_no_gap(
     counter: LossCounter,
 ) -> None:
