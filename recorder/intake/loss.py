@@ -75,23 +75,24 @@ class LossCounter:
         self._before: list[_Sequence] = []
         """The sequences as they were at the last `collect`, and in `_recent` what has come since."""
         self._surplus_before = 0
-        self._recent: list[tuple[int, int, int]] = []
+        self._recent: list[tuple[int, int, int, bool]] = []
 
-    def take(self, number: int, at_ns: int, published_ns: int = -1) -> None:
+    def take(self, number: int, at_ns: int, published_ns: int = -1, *, maybe_history: bool = False) -> None:
         """Notes a message.
 
         Args:
             number: of the middleware; below 1 where it does not number messages.
             at_ns: log time.
             published_ns: source time, which two messages of one number do not share; below 1 if unknown.
+            maybe_history: whether it may be one that a publisher had kept, and of which newer ones are known.
         """
         if number < 1:
             return
         if len(self._recent) <= _MAX_RECENT:
-            self._recent.append((number, at_ns, published_ns))
-        self._take(number, at_ns, published_ns)
+            self._recent.append((number, at_ns, published_ns, maybe_history))
+        self._take(number, at_ns, published_ns, maybe_history)
 
-    def _take(self, number: int, at_ns: int, published_ns: int) -> None:
+    def _take(self, number: int, at_ns: int, published_ns: int, maybe_history: bool) -> None:
         below: _Sequence | None = None
         for each in self._sequences:
             if each.last == number and each.published_ns == published_ns > 0:
@@ -101,6 +102,8 @@ class LossCounter:
                 below = each
         if below and below.last == number - 1:
             below.last, below.at_ns, below.published_ns = number, at_ns, published_ns
+        elif maybe_history and any(_is_older(number, published_ns, each) for each in self._sequences):
+            self._found(number)
         elif len(self._sequences) < self._expected:
             self._sequences.append(_Sequence(number, at_ns, published_ns))
         elif below:
@@ -188,6 +191,11 @@ class LossCounter:
             count = (first.last - first.first + 1) + (second.last - second.first + 1)
             # Numbers that no message has: below 1.
             self._missing[:2] = [_Missing(1 - count, 0, first.began_ns, second.ended_ns)]
+
+
+def _is_older(number: int, published_ns: int, sequence: _Sequence) -> bool:
+    """Returns whether a message is from before the newest of a sequence, by number and by source time."""
+    return number <= sequence.last and 0 < published_ns <= sequence.published_ns
 
 
 def _bounded(publishers: int) -> int:

@@ -14,6 +14,8 @@ from recorder.values import Channel, GapCause, Loss, Sample
 
 OVERLAP_S: Final = 1.0
 """The old and the new subscription run side by side for so long: discovery takes some tenths of a second."""
+_HISTORY_S: Final = 10.0
+"""For so long after that, a message that is older than what is known may be history: discovery was slow."""
 _MEASURED_S: Final = 1.0
 _TOLERANCE: Final = 1.25
 """A queue too short by this factor, or beyond its bound in bytes, is replaced."""
@@ -56,8 +58,15 @@ class Source:
         self._recent: dict[_Key, None] = {}
         self._newest_ns = 0
         """Source time of the newest message."""
-        self._history_until_ns = 0
-        """What the next subscription has up to this source time is history, whose numbers begin anew."""
+        self._history_until_ns: int | None = None
+        """What the next subscription has up to this source time may be history, whose numbers begin anew.
+
+        None if it has no history.
+        """
+        self._withheld: dict[_Key, None] = {}
+        """Messages that were not counted for it: they were live if they come by the present one, too."""
+        self._history_ends_at_s: float | None = None
+        """Until when what the present subscription has may be history; None if it is none."""
         self._measured_from_s = now.monotonic_s
         self._messages = self._bytes = 0
 
@@ -67,16 +76,20 @@ class Source:
         Raises:
             Exception: rclpy's; nothing has been taken.
         """
-        samples = counted = self._fresh(self._drain(self._subscription, now))
+        present = self._drain(self._subscription, now)
+        self._count(
+            [each for each in present if self._is_uncounted(each)], self._history_ends_at_s is not None
+        )
+        if self._history_ends_at_s is not None and now.monotonic_s >= self._history_ends_at_s:
+            self._history_ends_at_s = None
+        samples = self._fresh(present)
         if self._next:
             more = self._fresh(self._drain(self._next, now))
-            counted = samples + [each for each in more if each.publish_time_ns > self._history_until_ns]
-            samples = samples + more
-            if now.monotonic_s >= self._switch_at_s:
-                self._switch()
-        for each in counted:
-            self._loss.take(each.sequence, each.log_time_ns, each.publish_time_ns)
-            self._newest_ns = max(self._newest_ns, each.publish_time_ns)
+            switches = now.monotonic_s >= self._switch_at_s
+            self._count(more if switches else self._live(more), self._history_until_ns is not None)
+            samples += more
+            if switches:
+                self._switch(now)
         self._bytes += sum(len(each.data) for each in samples)
         self._messages += len(samples)
         self._emptied_at_s = now.monotonic_s
@@ -137,16 +150,41 @@ class Source:
             self._next = subscribe_raw(self._node, self._message_type, self.channel.topic, profile)
             self._profile, self._depth = profile, depth
             if profile.durability == DurabilityPolicy.TRANSIENT_LOCAL:
-                self._history_until_ns = self._newest_ns
+                # By this machine's clock, or by that of a publisher on another one whose clock is ahead.
+                self._history_until_ns = max(self._newest_ns, now.system_ns)
             self._switch_at_s = now.monotonic_s + OVERLAP_S
             if offers and is_latched(offers) and not self.channel.latched:
                 # Before its history comes, which later segments are to begin with.
                 self.channel = replace(self.channel, latched=True, offered_qos=offered_qos(offers))
 
-    def _switch(self) -> None:
+    def _count(self, samples: Sequence[Sample], maybe_history: bool) -> None:
+        for each in samples:
+            self._loss.take(
+                each.sequence, each.log_time_ns, each.publish_time_ns, maybe_history=maybe_history
+            )
+            self._newest_ns = max(self._newest_ns, each.publish_time_ns)
+
+    def _is_uncounted(self, sample: Sample) -> bool:
+        """Returns whether a message of the present subscription was not counted when the next one had it."""
+        key = _key(sample)
+        return key not in self._recent or key in self._withheld
+
+    def _live(self, samples: Sequence[Sample]) -> list[Sample]:
+        """Returns the samples of the next subscription that are no history; withholds the others."""
+        if self._history_until_ns is None:
+            return list(samples)
+        withheld = [each for each in samples if each.publish_time_ns <= self._history_until_ns]
+        _remember(self._withheld, withheld)
+        return [each for each in samples if each.publish_time_ns > self._history_until_ns]
+
+    def _switch(self, now: Instant) -> None:
         self._node.destroy_subscription(self._subscription)
         self._subscription, self._next = self._next, None
-        self._history_until_ns = 0
+        self._history_ends_at_s = None
+        if self._history_until_ns is not None:
+            self._history_ends_at_s = now.monotonic_s + _HISTORY_S
+        self._history_until_ns = None
+        self._withheld.clear()
         if not self.channel.latched:
             self._recent.clear()
 
@@ -170,9 +208,7 @@ class Source:
         if not (self._next or self.channel.latched):
             return samples
         fresh = [each for each in samples if _key(each) not in self._recent]
-        self._recent.update(dict.fromkeys(map(_key, fresh)))
-        while len(self._recent) > _REMEMBERED:
-            del self._recent[next(iter(self._recent))]
+        _remember(self._recent, fresh)
         return fresh
 
     def _sample(self, data: bytes, info: dict[str, Any], now: Instant) -> Sample:
@@ -189,3 +225,10 @@ class Source:
 
 def _key(sample: Sample) -> _Key:
     return sample.publish_time_ns, sample.sequence
+
+
+def _remember(keys: dict[_Key, None], samples: Sequence[Sample]) -> None:
+    """Adds the keys of samples, and forgets the oldest beyond the bound."""
+    keys.update(dict.fromkeys(map(_key, samples)))
+    while len(keys) > _REMEMBERED:
+        del keys[next(iter(keys))]
