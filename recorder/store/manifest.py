@@ -11,7 +11,6 @@ from typing import Final, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from recorder.mcap.records import note_of_gap
-from recorder.outages import parts_within
 from recorder.store.folder import ID, MANIFEST, SEGMENT, replace_file, segment_number
 from recorder.values import VIDEO_TOPIC, ChannelSummary, Gap, GapCause, Losses, SegmentSummary
 
@@ -220,8 +219,19 @@ class Manifest(_Part):
             if not _stops_all_channels(gap):
                 yield gap
                 continue
-            parts = parts_within((gap,), *self.window_ns) if self.window_ns else (gap,)
-            yield from (part for part in parts if not any(_are_one(part, each) for each in known))
+            part = self._since_window(gap)
+            if part and not any(_are_one(part, each) for each in known):
+                yield part
+
+    def _since_window(self, gap: Gap) -> Gap | None:
+        """Returns what of a gap does not lie before what a snapshot is to contain; None if all of it does.
+
+        The window's end cuts nothing: where the clock was set forward, files within it have later times.
+        """
+        if self.window_ns is None:
+            return gap
+        from_ns, _ = self.window_ns
+        return replace(gap, began_ns=max(gap.began_ns, from_ns)) if gap.ended_ns > from_ns else None
 
     @property
     def sha256(self) -> bytes:

@@ -135,6 +135,13 @@ def test_of_an_interruption_a_snapshot_has_what_lies_in_its_window() -> None:
     assert made.all_gaps == (lost, stop(20, 40))
 
 
+def test_an_interruption_after_the_clock_was_set_forward_is_in_the_snapshot() -> None:
+    """The defect: it was hidden, as what comes after the end of the window."""
+    made = manifest(kind=Kind.SNAPSHOT, window_ns=(20, 50))
+    gaps = (stop(40, 1000), stop(1005, 1010), stop(1020, 1020))
+    assert made.with_segment("data/000000.mcap", summary(gaps=gaps)).all_gaps == gaps
+
+
 def test_gaps_beyond_the_bound_are_counted_one_by_one() -> None:
     gaps = [*(gap(at) for at in range(MAX_GAPS)), *(gap(at + MAX_GAPS, None) for at in range(7))]
     made = manifest(gaps=gaps)
