@@ -76,7 +76,7 @@ class Source:
         Raises:
             Exception: rclpy's; nothing has been taken.
         """
-        present = self._drain(self._subscription, now)
+        present, following = self._drain_both(now)
         self._count(
             [each for each in present if self._is_uncounted(each)], self._history_ends_at_s is not None
         )
@@ -84,7 +84,7 @@ class Source:
             self._history_ends_at_s = None
         samples = self._fresh(present)
         if self._next:
-            more = self._fresh(self._drain(self._next, now))
+            more = self._fresh(following)
             switches = now.monotonic_s >= self._switch_at_s
             self._count(more if switches else self._live(more), self._history_until_ns is not None)
             samples += more
@@ -187,6 +187,16 @@ class Source:
         self._withheld.clear()
         if not self.channel.latched:
             self._recent.clear()
+
+    def _drain_both(self, now: Instant) -> tuple[list[Sample], list[Sample]]:
+        present = self._drain(self._subscription, now)
+        try:
+            following = self._drain(self._next, now) if self._next else []
+        except Exception:
+            if not present:
+                raise
+            following = []  # it will be raised again, when nothing can be lost by it
+        return present, following
 
     def _drain(self, subscription: Any, now: Instant) -> list[Sample]:
         samples: list[Sample] = []

@@ -182,6 +182,20 @@ def test_late_history_of_one_publisher_is_not_taken_for_messages_of_another() ->
     assert lost.messages == 1
 
 
+def test_an_error_of_the_next_subscription_costs_nothing_that_the_former_one_has(replaced: Replaced) -> None:
+    """The defect: what that had was taken, and the next one's copy counted as a repetition."""
+    replaced.former.receive((1, 1))
+    assert replaced.take(1) == [1]
+    following = replaced.replace(2)
+    replaced.former.receive((2, 2))
+    following.waiting.extend([OSError("no"), OSError("no again"), (2, 2), (3, 3)])
+    assert replaced.take(2.1) == [2]
+    with pytest.raises(OSError, match="no again"):
+        replaced.take(2.2)
+    assert replaced.take(2.3) == [3]
+    assert replaced.update(2.3) is None
+
+
 def test_a_publisher_that_starts_again_long_after_is_a_gap_of_unknown_size(replaced: Replaced) -> None:
     replaced.former.receive((5, 1))
     replaced.take(1)
