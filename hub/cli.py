@@ -348,6 +348,8 @@ def _run(work: Coroutine[Any, Any, ResultT]) -> ResultT:
             HubReason.UNREACHABLE: "Check that the servers run, and that their names are reachable from here",
             HubReason.REFUSED: "Name the directory of this hub with --dir",
             HubReason.NO_QUORUM: "Start the other servers of the cluster, and try again",
+            HubReason.NO_RESPONDERS: "Check that all servers run, each with its nats.conf of"
+            " robot-bridge hub init, then type: robot-bridge hub apply",
         }
         code = ExitCode.UNREACHABLE if error.reason is HubReason.UNREACHABLE else ExitCode.FAILED
         raise UserError(str(error), remedies.get(error.reason, "Try again"), exit_code=code) from error

@@ -9,7 +9,7 @@ from typing import Any, Final
 from fleet import names
 from fleet.connection import Hub
 from fleet.errors import HubError, HubReason
-from hub.electing import once_elected
+from hub.electing import once_joined
 
 _DAY_NS: Final = 86_400 * 1_000_000_000
 _MIB: Final = 1024 * 1024
@@ -79,19 +79,22 @@ async def set_up(hub: Hub, replicas: int, limits: StreamLimits = StreamLimits())
     """Makes the streams and buckets that are missing, and room in those that exist, where `limits` has more.
 
     Less room would cost messages, so it counts as a difference. Waits for nodes of a cluster that are still
-    joining, and for leaders, JOINING_S in all.
+    joining, JOINING_S in all; what it has begun by then, it ends.
 
     Returns:
         What differs in existing ones, as "fleet_events: max_bytes is 1, expected 2".
 
     Raises:
-        HubError: the hub does not do it.
+        HubError: the hub does not do it, or its servers run without JetStream.
     """
     deadline_s = asyncio.get_running_loop().time() + JOINING_S
     differences: list[str] = []
     for name, config in stream_configs(replicas, limits).items():
         make = partial(_make, hub, name, config, limits.chosen(name))
-        differences += await once_elected(make, deadline_s)
+        try:
+            differences += await once_joined(make, deadline_s)
+        except HubError as error:
+            raise HubError(error.reason, f"{name} can't be set up: {_meaning(error)}", error.code) from error
     return differences
 
 
@@ -187,6 +190,13 @@ async def _make(hub: Hub, name: str, config: dict[str, Any], chosen: Mapping[str
     free = _DEFAULTS.chosen(name).keys() - chosen.keys()
     expected = {key: value for key, value in config.items() if key not in free}
     return _differences(name, expected, changed)
+
+
+def _meaning(error: HubError) -> str:
+    """Returns what a refusal by the API of JetStream means, for people."""
+    if error.reason is not HubReason.NO_RESPONDERS:
+        return str(error)
+    return f"{error}: its servers run without JetStream"
 
 
 def _stream(subjects: str, max_bytes: int, max_age_ns: int, more: Mapping[str, Any]) -> dict[str, Any]:

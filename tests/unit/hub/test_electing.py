@@ -66,11 +66,40 @@ async def test_the_hubs_own_word_is_what_is_reported() -> None:
     assert ended.value.reason is HubReason.NO_QUORUM
 
 
+_JOINING = [HubReason.NO_QUORUM, HubReason.TIMEOUT]
+
+
+@pytest.mark.parametrize("reason", _JOINING, ids=lambda each: each.value)
 @in_virtual_time
-async def test_work_that_follows_other_work_has_what_is_left() -> None:
-    deadline_s = asyncio.get_running_loop().time() + 2.0
-    await electing.once_elected(Work(takes_s=1.5), deadline_s)
-    for _ in range(2):  # Also when nothing is left.
-        with pytest.raises(HubError, match="in time"):
-            await electing.once_elected(Work(takes_s=1.5), deadline_s)
-    assert asyncio.get_running_loop().time() == pytest.approx(2.0)
+async def test_nodes_that_still_join_are_waited_for_until_the_end(reason: HubReason) -> None:
+    """And then tried once more: they may have joined during the last pause."""
+    work = Work(*[reason] * 1000)
+    with pytest.raises(HubError, match="does not do it") as ended:
+        await electing.once_joined(work, 10.0)
+    assert ended.value.reason is reason
+    assert asyncio.get_running_loop().time() == pytest.approx(10.0)
+    assert 10 < work.attempts < 20
+
+
+@pytest.mark.parametrize("before", [[], [HubReason.NO_QUORUM]], ids=["first", "second"])
+@in_virtual_time
+async def test_an_attempt_that_is_begun_in_time_is_not_ended(before: list[HubReason]) -> None:
+    assert await electing.once_joined(Work(*before, takes_s=4.0), 4.2) == "done"
+
+
+@in_virtual_time
+async def test_one_attempt_is_made_where_no_time_is_left() -> None:
+    """The defect: it was refused without one, in words that gave no reason."""
+    assert await electing.once_joined(Work(takes_s=1.5), 0.0) == "done"
+    work = Work(*_JOINING, takes_s=1.5)
+    with pytest.raises(HubError, match="does not do it") as ended:
+        await electing.once_joined(work, 0.0)
+    assert (ended.value.reason, work.attempts) == (HubReason.NO_QUORUM, 1)
+
+
+@in_virtual_time
+async def test_servers_without_jetstream_are_not_waited_for() -> None:
+    work = Work(HubReason.NO_RESPONDERS)
+    with pytest.raises(HubError, match="does not do it"):
+        await electing.once_joined(work, 10.0)
+    assert work.attempts == 1

@@ -16,14 +16,22 @@ class _Joining:
 
     Args:
         errors: of the first calls, in their order.
+        joined_s: until when, of the event loop's clock, too few nodes have joined to make a stream.
+        takes_s: how long it takes to make one then.
     """
 
-    def __init__(self, errors: list[HubError]) -> None:
+    def __init__(self, errors: list[HubError], joined_s: float = 0.0, takes_s: float = 0.0) -> None:
         self.errors = errors
         self.calls: list[str] = []
+        self._joined_s = joined_s
+        self._takes_s = takes_s
 
     async def api(self, call: str, _request: Any = None) -> dict[str, Any]:
         self.calls.append(call)
+        if "CREATE" in call:
+            if asyncio.get_running_loop().time() < self._joined_s:
+                raise no_quorum()
+            await asyncio.sleep(self._takes_s)
         if self.errors:
             raise self.errors.pop(0)
         if call.startswith("STREAM.INFO."):
@@ -57,10 +65,29 @@ async def test_a_leader_that_answers_nothing_is_waited_for() -> None:
 @in_virtual_time
 async def test_but_not_for_ever() -> None:
     hub = _Joining([no_quorum()] * 1000)
-    with pytest.raises(HubError, match="peer offline"):
+    with pytest.raises(HubError, match=r"^fleet_events can't be set up: .*peer offline"):
         await made_by(hub)
     assert asyncio.get_running_loop().time() == pytest.approx(streams.JOINING_S)
     assert streams.JOINING_S / 2 < len(hub.calls) < 2 * streams.JOINING_S, "about once a second"
+
+
+@pytest.mark.parametrize("takes_s", [0.25, 4.0])
+@in_virtual_time
+async def test_nodes_that_have_joined_at_the_last_moment_make_all_streams(takes_s: float) -> None:
+    """The defect: when the time to join was over, a stream in the making was given up, others not made."""
+    hub = _Joining([], streams.JOINING_S - 0.5, takes_s)
+    assert await made_by(hub) == []
+    assert len([call for call in hub.calls if "CREATE" in call]) > len(streams.stream_configs(3))
+
+
+@in_virtual_time
+async def test_servers_without_jetstream_are_reported_at_once() -> None:
+    """The defect: after 30 s. Nodes that still join never answer so."""
+    nothing = HubError(HubReason.NO_RESPONDERS, "nothing at the hub takes $JS.API.STREAM.INFO.fleet_events")
+    with pytest.raises(HubError, match="run without JetStream") as refused:
+        await made_by(_Joining([nothing] * 1000))
+    assert refused.value.reason is HubReason.NO_RESPONDERS
+    assert asyncio.get_running_loop().time() == 0
 
 
 class _Made:
