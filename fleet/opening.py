@@ -13,11 +13,16 @@ from fleet.errors import HubError, HubReason, UnreachableError
 from fleet.session import Session
 
 NEXT_AFTER_S: Final = 1.0
-"""A server that has not answered after this time has the next one tried beside it; where there is no next one
-and another one refuses, it is not waited for any longer.
+"""A server that has not answered after this time has the next one tried beside it.
 
 More than the 250 ms of RFC 8305, because TLS and authentication are in it, and because the robots of a lost
 node come to the other ones all at once: these are slow then, and further attempts would make them slower.
+"""
+REFUSED_AFTER_S: Final = 2.75
+"""Where one server refuses, the others are waited for until this time after the last one of all was tried.
+
+As long as callers, who wait 5 s, still learn of the refusal where the last of three is tried after 2 s. No
+shorter: a node that has lost its accounts refuses all robots, and the others are slow for the reason above.
 """
 
 
@@ -52,14 +57,18 @@ async def _first(
     """Returns the first attempt that succeeds; `attempts` gets every one that is begun."""
     worst: HubError = UnreachableError("no server of the hub is configured")
     left, running = list(servers), set[asyncio.Task[Session]]()
+    now_s = asyncio.get_running_loop().time
+    tried_s = now_s()
     while left or running:
         if left:
             attempts.append(asyncio.create_task(open_one(left.pop(0))))
             running.add(attempts[-1])
+            tried_s = now_s()
         refused = worst.reason is HubReason.REFUSED
-        ended, running = await asyncio.wait(
-            running, timeout=NEXT_AFTER_S if left or refused else None, return_when=asyncio.FIRST_COMPLETED
-        )
+        timeout_s: float | None = NEXT_AFTER_S
+        if not left:
+            timeout_s = max(0.0, tried_s + REFUSED_AFTER_S - now_s()) if refused else None
+        ended, running = await asyncio.wait(running, timeout=timeout_s, return_when=asyncio.FIRST_COMPLETED)
         # Callers wait no longer than for the time-out of a silent one: they would not learn of the refusal.
         if refused and not left and not ended:
             break

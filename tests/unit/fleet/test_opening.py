@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from fleet.errors import HubError, HubReason, RefusedError, UnreachableError
-from fleet.opening import NEXT_AFTER_S, first_to_open
+from fleet.opening import NEXT_AFTER_S, REFUSED_AFTER_S, first_to_open
 from tests.support.virtual_time import in_virtual_time
 
 _TIMEOUT_S = 5.0
@@ -130,15 +130,48 @@ async def test_which_is_not_kept_back_until_a_silent_one_has_timed_out() -> None
         with pytest.raises(RefusedError, match="revoked"):
             await servers.first(*order)
         assert len(servers.tried) == 3, "another one may accept them"
-        assert asyncio.get_running_loop().time() - begun_s < 3.5 * NEXT_AFTER_S
+        assert asyncio.get_running_loop().time() - begun_s <= 2 * NEXT_AFTER_S + REFUSED_AFTER_S
         assert sorted(servers.ended) == ["b", "c"]
 
 
+_REFUSAL = (0.1, RefusedError("not known yet"))
+
+
+@pytest.mark.parametrize("slow_s", [0.9, 1.5, 2.5])
 @in_virtual_time
-async def test_one_that_is_slow_is_still_taken_where_the_others_refuse() -> None:
-    refusal = (0.1, RefusedError("not known yet"))
-    servers = Servers(a=refusal, b=refusal, c=(0.9 * NEXT_AFTER_S, None))
-    assert (await servers.first("a", "b", "c")).server == "c"
+async def test_one_that_is_slow_is_still_taken_where_the_others_refuse(slow_s: float) -> None:
+    """The defect: after 1 s it was given up, and with the next attempt again.
+
+    A node that has lost its accounts refuses all robots, and when another one dies, its robots come to the
+    third one all at once.
+    """
+    for order in itertools.permutations("abc"):
+        servers = Servers(a=_REFUSAL, b=_REFUSAL, c=(slow_s, None))
+        assert (await servers.first(*order)).server == "c", order
+
+
+@pytest.mark.parametrize("slow_s", [0.9, 1.5, 2.5])
+@in_virtual_time
+async def test_also_where_another_one_is_silent(slow_s: float) -> None:
+    for order in itertools.permutations("abc"):
+        servers = Servers(a=_REFUSAL, c=(slow_s, None))
+        assert (await servers.first(*order)).server == "c", order
+
+
+@in_virtual_time
+async def test_after_a_refusal_other_failures_do_not_prolong_the_wait() -> None:
+    servers = Servers(a=_REFUSAL, b=(2.0, UnreachableError("closed")))
+    with pytest.raises(RefusedError):
+        await servers.first("a", "b", "c")
+    assert asyncio.get_running_loop().time() == pytest.approx(0.1 + NEXT_AFTER_S + REFUSED_AFTER_S)
+
+
+@in_virtual_time
+async def test_a_refusal_that_comes_late_ends_the_wait() -> None:
+    servers = Servers(a=(4.0, RefusedError("revoked")))
+    with pytest.raises(RefusedError):
+        await servers.first("a", "b")
+    assert asyncio.get_running_loop().time() == pytest.approx(4.0)
 
 
 @in_virtual_time

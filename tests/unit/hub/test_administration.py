@@ -8,7 +8,7 @@ import pytest
 
 from fleet import names
 from fleet.errors import HubError, HubReason
-from fleet.opening import NEXT_AFTER_S
+from fleet.opening import NEXT_AFTER_S, REFUSED_AFTER_S
 from hub import administration
 from hub.directory import HubDirectory, HubRecord, User
 from hub.receiver import relisting
@@ -85,3 +85,8 @@ async def test_a_purge_waits_for_a_leader_and_is_made_once(electing: Electing) -
 @pytest.mark.parametrize("patience_s", [administration._CONNECT_S, relisting._CONNECT_S])
 def test_two_silent_servers_of_three_leave_time_for_the_third(patience_s: float) -> None:
     assert patience_s / 2 > 2 * NEXT_AFTER_S
+
+
+@pytest.mark.parametrize("patience_s", [administration._CONNECT_S, relisting._CONNECT_S])
+def test_and_a_refusal_is_known_before_it_ends(patience_s: float) -> None:
+    assert patience_s > 2 * NEXT_AFTER_S + REFUSED_AFTER_S

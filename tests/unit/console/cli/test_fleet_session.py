@@ -2,7 +2,7 @@
 
 from console.cli.fleet_session import _REMEDIES, _UNREACHABLE, ANSWERS_WITHIN_S
 from fleet.errors import HubReason
-from fleet.opening import NEXT_AFTER_S
+from fleet.opening import NEXT_AFTER_S, REFUSED_AFTER_S
 
 
 def test_remedies_are_for_reasons_that_there_are() -> None:
@@ -15,3 +15,7 @@ def test_remedies_are_for_reasons_that_there_are() -> None:
 
 def test_two_silent_servers_of_three_leave_time_for_the_third() -> None:
     assert 2 * NEXT_AFTER_S < ANSWERS_WITHIN_S / 2
+
+
+def test_and_a_refusal_is_known_before_it_ends() -> None:
+    assert 2 * NEXT_AFTER_S + REFUSED_AFTER_S < ANSWERS_WITHIN_S
