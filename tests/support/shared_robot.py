@@ -74,7 +74,7 @@ class SharedRobot:
                 await make_available(operator)
                 async with operator.drive(BY_EYE) as session:
                     return [await self._stop(onlooker, operator, session) for _ in range(count)]
-        except GatewayError as error:
+        except (GatewayError, AssertionError) as error:
             raise AssertionError(f"a robot that is driven and stopped: {error}") from error
 
     async def _stop(
