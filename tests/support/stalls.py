@@ -55,11 +55,13 @@ class Stalls:
             thread.join(_END_S)
 
     def _look(self, processor: int) -> None:
-        os.sched_setaffinity(0, {processor})  # of this thread
-        now_s, stopped = time.monotonic(), False
-        while not stopped:
-            due_s = self._due_s[processor] = now_s + _EVERY_S
-            stopped = self._stop.wait(_EVERY_S)
-            now_s = time.monotonic()
-            self._noted_s[processor] = max(self._noted_s.get(processor, 0.0), now_s - due_s)
-        del self._due_s[processor]
+        try:
+            os.sched_setaffinity(0, {processor})  # of this thread
+            now_s, stopped = time.monotonic(), False
+            while not stopped:
+                due_s = self._due_s[processor] = now_s + _EVERY_S
+                stopped = self._stop.wait(_EVERY_S)
+                now_s = time.monotonic()
+                self._noted_s[processor] = max(self._noted_s.get(processor, 0.0), now_s - due_s)
+        finally:
+            del self._due_s[processor]
