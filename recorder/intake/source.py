@@ -77,9 +77,7 @@ class Source:
             Exception: rclpy's; nothing has been taken.
         """
         present, following = self._drain_both(now)
-        self._count(
-            [each for each in present if self._is_uncounted(each)], self._history_ends_at_s is not None
-        )
+        self._count(self._uncounted(present), self._history_ends_at_s is not None)
         if self._history_ends_at_s is not None and now.monotonic_s >= self._history_ends_at_s:
             self._history_ends_at_s = None
         samples = self._fresh(present)
@@ -164,10 +162,11 @@ class Source:
             )
             self._newest_ns = max(self._newest_ns, each.publish_time_ns)
 
-    def _is_uncounted(self, sample: Sample) -> bool:
-        """Returns whether a message of the present subscription was not counted when the next one had it."""
-        key = _key(sample)
-        return key not in self._recent or key in self._withheld
+    def _uncounted(self, samples: list[Sample]) -> list[Sample]:
+        """Returns those of the present subscription that were not counted when the next one had them."""
+        if not self._recent:
+            return samples  # as on every topic that is neither latched nor has a next subscription
+        return [each for each in samples if (key := _key(each)) not in self._recent or key in self._withheld]
 
     def _live(self, samples: Sequence[Sample]) -> list[Sample]:
         """Returns the samples of the next subscription that are no history; withholds the others."""
