@@ -59,24 +59,16 @@ def lost_camera(robot: Deployment, client: GatewayClient) -> Iterator[None]:
 def lost_hub(robot: Deployment, client: GatewayClient) -> Iterator[None]:
     """The fleet's hub dies, and is started again."""
     robot.hub.kill(0)
-    try:
+    with _shown_until(client, CloudState.OFFLINE, robot.hub.start_all):
         yield
-        _wait_for_cloud(client, CloudState.OFFLINE, SEEN_WITHIN_S)
-    finally:
-        robot.hub.start_all()
-    _wait_for_cloud(client, CloudState.CONNECTED, CONNECTED_WITHIN_S)
 
 
 @contextmanager
 def frozen_bridge(robot: Deployment, client: GatewayClient) -> Iterator[None]:
     """The bridge stands still; its connections stay open and silent."""
     robot.bridge.freeze()
-    try:
+    with _shown_until(client, CloudState.UNREACHABLE, robot.bridge.thaw):
         yield
-        _wait_for_cloud(client, CloudState.UNREACHABLE, SEEN_WITHIN_S)
-    finally:
-        robot.bridge.thaw()
-    _wait_for_cloud(client, CloudState.CONNECTED, CONNECTED_WITHIN_S)
 
 
 @contextmanager
@@ -92,12 +84,8 @@ def full_outbox(robot: Deployment, client: GatewayClient) -> Iterator[None]:
 def killed_bridge(robot: Deployment, client: GatewayClient) -> Iterator[None]:
     """The bridge dies, and is started again."""
     robot.bridge.kill()
-    try:
+    with _shown_until(client, CloudState.UNREACHABLE, robot.bridge.start):
         yield
-        _wait_for_cloud(client, CloudState.UNREACHABLE, SEEN_WITHIN_S)
-    finally:
-        robot.bridge.start()
-    _wait_for_cloud(client, CloudState.CONNECTED, CONNECTED_WITHIN_S)
 
 
 @contextmanager
@@ -113,6 +101,17 @@ FAULTS: Final = (no_fault, silent_sensor, lost_camera, lost_hub, frozen_bridge, 
 """Those of the long run: all programs live through it, so that what they keep adds up."""
 DEATHS: Final = (killed_bridge,)
 """Those that end a program, and with it what it has kept: no part of the long run."""
+
+
+@contextmanager
+def _shown_until(client: GatewayClient, state: CloudState, repair: Callable[[], object]) -> Iterator[None]:
+    """Waits until the status shows the state of the fleet's connection, repairs it, and waits for that."""
+    try:
+        yield
+        _wait_for_cloud(client, state, SEEN_WITHIN_S)
+    finally:
+        repair()
+    _wait_for_cloud(client, CloudState.CONNECTED, CONNECTED_WITHIN_S)
 
 
 def _wait_for_fault(client: GatewayClient, *, active: bool) -> None:
