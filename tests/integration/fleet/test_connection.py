@@ -79,13 +79,7 @@ async def test_an_attempt_at_a_server_that_falls_silent_within_tls_ends_when_it_
         # The first message of TLS.
         await reader.read(65536)
         greeted.set()
-        try:
-            while await reader.read(65536):
-                pass
-        except ConnectionError:
-            return
-        finally:
-            writer.close()
+        await _read_to_its_end(reader, writer)
 
     async with await asyncio.start_server(greet, "127.0.0.1", 0) as server:
         url = f"tls://127.0.0.1:{server.sockets[0].getsockname()[1]}"
@@ -389,18 +383,23 @@ async def test_a_server_may_say_anything() -> None:
     await asyncio.gather(*(_hear(greeting) for greeting in _GREETINGS))
 
 
+async def _read_to_its_end(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    """Reads until the other side closes the connection, and closes it as well."""
+    try:
+        while await reader.read(65536):
+            pass
+    except ConnectionError:
+        return
+    finally:
+        writer.close()
+
+
 async def _hear(greeting: bytes) -> None:
     """Connects to a server that says this, whatever it is asked."""
 
     async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         writer.write(greeting)
-        try:
-            while await reader.read(65536):
-                pass
-        except ConnectionError:
-            return
-        finally:
-            writer.close()
+        await _read_to_its_end(reader, writer)
 
     async with await asyncio.start_server(talk, "127.0.0.1", 0) as server:
         url = f"nats://127.0.0.1:{server.sockets[0].getsockname()[1]}"
