@@ -155,7 +155,7 @@ class Hub:
         Raises:
             HubError: there was none within `timeout_s`; its reason is that of the last attempt.
         """
-        if await self.changed.wait_until(lambda: self._link.connected, timeout_s):
+        if await self.changed.wait_until(self._stands, timeout_s):
             return
         if self._link.reason is HubReason.REFUSED:
             raise RefusedError(self._link.text)
@@ -448,6 +448,12 @@ class Hub:
             self._link.connections + connected,
         )
         self.changed.notify_all()
+
+    def _stands(self) -> bool:
+        # Of a session that was lost just now, `link` says so once the supervisor has had its turn. If callers
+        # were let through until then, one that repeats what fails would keep the event loop from that turn.
+        lost = self._session is not None and self._session.lost.done()
+        return self._link.connected and not lost
 
     def _open(self) -> Session:
         if self._session is None:

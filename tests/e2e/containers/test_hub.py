@@ -22,7 +22,6 @@ from typer.testing import CliRunner
 from bridge.uploads.receivers import Receivers
 from fleet import names
 from fleet.connection import FleetAddress, Hub, Published, Start, connect
-from fleet.errors import HubError
 from fleet.receipt_keys import confirmed, read_public_keys
 from hub.cli import app as hub_app
 from hub.directory import HubDirectory
@@ -32,6 +31,7 @@ from tests.e2e.containers.deployment import docker
 from tests.support.engine import ROOT, TAG
 from tests.support.fleet_values import healthy_state
 from tests.support.free import free_tcp_port
+from tests.support.hub_patience import in_the_end
 from tests.support.s3_server import S3Server, s3_server
 from tests.support.waiting import wait_until
 
@@ -196,22 +196,12 @@ async def test_a_killed_node_costs_no_event_and_no_state(hub: HubInContainers) -
         node = hub.node_of(robot)
         await asyncio.to_thread(hub.type, f"{COMPOSE} kill {node}")
         # How long it may take is measured without containers (tests/integration/hub/test_cluster.py).
-        async with asyncio.timeout(UP_WITHIN_S):
-            await published(robot, names.event_subject(ROBOT, "run", 2), b"after")
+        after = partial(robot.publish_once, names.event_subject(ROBOT, "run", 2), b"after", 2.0)
+        await in_the_end(after, UP_WITHIN_S)
         assert hub.node_of(robot) != node
         assert await seen(hub) == ([b"before", b"after"], healthy_state(ROBOT).SerializeToString())
     await asyncio.to_thread(hub.type, f"{COMPOSE} start {node}")
     await asyncio.to_thread(hub.wait_healthy, node)
-
-
-async def published(robot: Hub, subject: str, payload: bytes) -> None:
-    while True:
-        try:
-            await robot.publish_once(subject, payload, 2.0)
-        except HubError:
-            await robot.connected()
-        else:
-            return
 
 
 async def seen(hub: HubInContainers) -> tuple[list[bytes], bytes]:

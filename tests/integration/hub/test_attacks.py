@@ -4,15 +4,17 @@ import asyncio
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import pytest
 
 from fleet import names
-from fleet.connection import FleetAddress, Hub, Published, connect
+from fleet.connection import FleetAddress, Published, connect
 from fleet.errors import HubError, HubReason, RefusedError
 from fleet.serving import Request
 from hub import administration
 from tests.support.attacked_hub import connected, thiefs_session, unchanged
+from tests.support.hub_patience import in_the_end
 from tests.support.secure_hub import BOTH_SERVERS, SecureHub, first_answer, secure_hub
 
 _REVOKED_WITHIN_S = 5.0
@@ -202,7 +204,7 @@ async def test_a_flood_of_one_costs_the_others_no_events(
         for sequence in range(3000):
             await session.publish(f"fleet.a.ev.flood.{sequence}", b"x" * 4096)
         for sequence in range(20):
-            await _until_delivered(robot, f"fleet.b.ev.flooded.{sequence}")
+            await in_the_end(partial(robot.publish_once, f"fleet.b.ev.flooded.{sequence}", b"event"))
     async with connected(hub.administrator()) as administrator:
         subjects = {"subjects_filter": "fleet.b.ev.flooded.*"}
         info = await administrator.api(f"STREAM.INFO.{names.EVENTS}", subjects)
@@ -265,14 +267,3 @@ async def test_a_server_without_tls_gets_no_credentials(thief: FleetAddress) -> 
     assert refused.value.reason is HubReason.UNREACHABLE
     assert "does not offer TLS" in str(refused.value)
     assert said == b""
-
-
-async def _until_delivered(robot: Hub, subject: str) -> None:
-    async with asyncio.timeout(30):
-        while True:
-            try:
-                await robot.publish_once(subject, b"event")
-            except HubError:
-                await robot.connected()
-            else:
-                return

@@ -14,6 +14,7 @@ from fleet.connection import FleetAddress, Hub, Published, Start, connect
 from fleet.errors import HubError, HubReason
 from hub import streams
 from tests.support.eventually import eventually
+from tests.support.hub_patience import in_the_end
 from tests.support.nats_servers import NatsServers, nats_servers
 from tests.support.secure_hub import SecureHub, secure_hub
 from tests.support.simulated_fleet import received, simulated_fleet
@@ -107,7 +108,7 @@ async def test_without_a_majority_nothing_is_acknowledged(tmp_path: Path) -> Non
             unsure = {HubReason.TIMEOUT, HubReason.NO_RESPONDERS, HubReason.NO_QUORUM, HubReason.UNREACHABLE}
             assert refused.value.reason in unsure
             servers.start((survivor + 1) % 3)
-            await _publish_in_the_end(hub, "fleet.r.ev.run.0")
+            await in_the_end(partial(hub.publish_once, "fleet.r.ev.run.0", b"", 2.0))
         result = await received(servers.urls, 1, 1)
     assert (result.lost, result.duplicates) == (0, 0), result
 
@@ -124,28 +125,19 @@ async def test_people_read_at_every_node_and_go_on_without_one(secure: SecureHub
     async with connect(secure.administrator()) as administrator, connect(reader) as hub:
         for each in (administrator, hub):
             await each.connected(20)
-        await administrator.put(names.STATES, "r1", b"state")
+        await in_the_end(partial(administrator.put, names.STATES, "r1", b"state"))
         for url in secure.servers.urls:
             async with connect(replace(reader, servers=(url,))) as at_node:
                 await at_node.connected(20)
-                read = partial(at_node.entries, names.STATES)
-                await eventually(read, lambda found: "r1" in found, "the node has caught up")
-                assert (await at_node.stream_info(names.EVENTS))["state"]["messages"] == 0
+                read = partial(in_the_end, partial(at_node.entries, names.STATES))
+                await eventually(read, lambda found: "r1" in found, "the node has caught up", 60.0)
+                info = await in_the_end(partial(at_node.stream_info, names.EVENTS))
+                assert info["state"]["messages"] == 0
         subjects = [names.event_subject("r1", "run", number) for number in range(2)]
         async with aclosing(hub.follow(names.EVENTS, "fleet.r1.ev.>", Start.all())) as events:
-            await administrator.publish_once(subjects[0], b"")
+            await in_the_end(partial(administrator.publish_once, subjects[0], b""))
             assert (await anext(events)).subject == subjects[0]
+            await hub.connected(20)
             await asyncio.to_thread(secure.servers.kill, secure.servers.urls.index(hub.link.server))
-            await _publish_in_the_end(administrator, subjects[1])
+            await in_the_end(partial(administrator.publish_once, subjects[1], b"", 2.0))
             assert (await anext(events)).subject == subjects[1]
-
-
-async def _publish_in_the_end(hub: Hub, subject: str) -> None:
-    async with asyncio.timeout(60):
-        while True:
-            try:
-                await hub.publish_once(subject, b"", 2.0)
-            except HubError:
-                await hub.connected(30)
-            else:
-                return

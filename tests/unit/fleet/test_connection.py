@@ -79,6 +79,17 @@ async def test_the_server_that_was_lost_is_the_last_to_be_tried(servers: Servers
 
 
 @in_virtual_time
+async def test_one_that_has_just_been_lost_is_no_connection(servers: Servers) -> None:
+    """The defect: who repeated a call that fails without it never let the supervisor have its turn."""
+    async with running("a", "b") as hub:
+        servers.sessions[-1].lost.set_result(UnreachableError("stale connection"))
+        with pytest.raises(UnreachableError, match="stale connection"):
+            await hub.connected(0.1)
+        await hub.connected()
+        assert [each.server for each in servers.sessions] == ["a", "b"]
+
+
+@in_virtual_time
 async def test_the_only_server_is_tried_again(servers: Servers) -> None:
     async with running("a"):
         await servers.lose()
