@@ -346,8 +346,7 @@ class Session:
     @contextmanager
     def waiter(self, subject: str) -> Iterator[tuple[Waiter, str]]:
         """Yields where the replies to a request on this subject arrive, and the subject that they go to."""
-        if self.lost.done():
-            raise self.lost.result()
+        self._check()
         self._count += 1
         token = str(self._count)
         self._waiters[token] = waiter = Waiter(subject, self._client.not_taken)
@@ -415,11 +414,16 @@ class Session:
         for waiter in self._waiters.values():
             waiter.replies.put_nowait(reason)
 
+    def _check(self) -> None:
+        """Raises why the connection is lost, if it is."""
+        if self.lost.done():
+            # It is raised for each call, and would keep the place of each.
+            raise self.lost.result().with_traceback(None)
+
     async def _publish(
         self, subject: str, payload: bytes, reply: str, headers: dict[str, str] | None
     ) -> None:
-        if self.lost.done():
-            raise self.lost.result()
+        self._check()
         if not self._client.is_connected:
             raise UnreachableError("the connection to the hub is lost")
         # The library knows the limit of the server alone, which is a higher one.

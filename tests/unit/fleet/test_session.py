@@ -1,11 +1,14 @@
 """A session that is being opened ends when it is cancelled, whatever the NATS library makes of it."""
 
 import asyncio
+import traceback
+from functools import partial
 from typing import Any
 
 import pytest
 
 from fleet import session
+from fleet.errors import UnreachableError
 from fleet.session import Session
 
 
@@ -39,3 +42,16 @@ async def test_a_cancellation_that_comes_with_the_connection_is_not_lost(
     opening.cancel()
     with pytest.raises(asyncio.CancelledError):
         await opening
+
+
+async def test_an_error_that_many_calls_raise_does_not_grow_with_them() -> None:
+    """The defect: it kept the place of each, and to print it took minutes."""
+    lost = Session(_Connecting(), "nats://127.0.0.1:1", "_INBOX")
+    lost.note_closed(None)
+    places = []
+    for _ in range(3):
+        for call in (partial(lost.publish, "a", b""), partial(lost.request, "a", b"", 1.0)):
+            with pytest.raises(UnreachableError, match="can't be reached") as raised:
+                await call()
+            places.append(len(list(traceback.walk_tb(raised.value.__traceback__))))
+    assert places[2:] == [*places[:2], *places[:2]]
