@@ -3,7 +3,8 @@
 So does the whole run, because fixtures of the session end after the last module.
 
 A process that outlives its parent can't be found among the children of the test's own process: what a test
-starts carries a mark in its environment instead, and so does what that starts.
+starts carries a mark in its environment instead, and so does what that starts. When the process of the tests
+is ended from outside, what bears its mark is ended after it (reaper.py).
 """
 
 import gc
@@ -24,6 +25,8 @@ from typing import Final
 import psutil
 import pytest
 
+from tests.support.reaper import start_reaper
+
 _MARK: Final = "ROBOT_GATEWAY_TEST_RUN"
 GONE_WITHIN_S = 10.0
 _PORTS_OF_THE_PROCESS: Final = "@robot-gateway-ports-"
@@ -42,6 +45,7 @@ _MAY_STAY_OF_ALL: Final = Counter({_UNNAMED: 1024})
 def pytest_configure() -> None:
     """Marks this process, a worker of the run; nothing else has the same mark."""
     os.environ[_MARK] = uuid.uuid4().hex
+    start_reaper(_MARK, os.environ[_MARK])
 
 
 @pytest.fixture(autouse=True)

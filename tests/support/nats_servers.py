@@ -134,9 +134,12 @@ class NatsServers:
 
     def close(self) -> None:
         """Ends every node."""
-        for node, process in enumerate(self.processes):
-            if process is not None:
-                self.kill(node)
+        running = [node for node, process in enumerate(self.processes) if process is not None]
+        # All of them first: where the end of one takes too long, no other one is left running.
+        for node in running:
+            self._process(node).kill()
+        for node in running:
+            self.kill(node)
 
     def _process(self, node: int) -> subprocess.Popen[bytes]:
         process = self.processes[node]

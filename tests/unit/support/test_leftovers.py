@@ -1,6 +1,13 @@
 """What a module of tests leaves behind fails it."""
 
+import os
+import signal
+from contextlib import suppress
+
 import pytest
+
+from tests.support.processes import has_ended
+from tests.support.waiting import wait_until
 
 pytest_plugins = ["pytester"]
 
@@ -53,6 +60,30 @@ def test_a_fixture_of_the_session_that_leaves_something_fails(pytester: pytest.P
 
 def test_modules_that_tidy_up_pass(pytester: pytest.Pytester) -> None:
     run(pytester, TIDY).assert_outcomes(passed=len(TIDY))
+
+
+ENDED = """
+import os, signal, subprocess
+from pathlib import Path
+
+def test_it():
+    # As a program does that outlives its parent, too.
+    subprocess.run(["sh", "-c", "sleep 600 & echo $! > pid"], check=True)
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_what_a_process_has_started_that_was_killed_ends_after_it(pytester: pytest.Pytester) -> None:
+    """The defect: servers of a test that hung ran on, as bounds.py ends its process without fixtures."""
+    pytester.makepyfile(test_ended=ENDED)
+    ran = pytester.runpytest_subprocess("-p", "tests.support.leftovers", "-p", "no:cacheprovider")
+    assert ran.ret == -signal.SIGKILL
+    pid = int((pytester.path / "pid").read_text(encoding="ascii"))
+    try:
+        wait_until(lambda: has_ended(pid), "it has ended", 60.0)
+    finally:
+        with suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
 
 
 def run(pytester: pytest.Pytester, bodies: dict[str, str], more: str = "") -> pytest.RunResult:
