@@ -136,6 +136,8 @@ class Hub:
         self._address = address
         self._session: Session | None = None
         self._last_server = ""
+        self._refusal = ""
+        """Of a server, in the present attempt at them all; empty: none refuses yet."""
         self._services: list[Service] = []
         self._calls: set[asyncio.Task[None]] = set()
         self._link = Link(False, "", None, "", asyncio.get_running_loop().time(), 0)
@@ -149,16 +151,26 @@ class Hub:
         """Whether there is a connection."""
         return self._link
 
-    async def connected(self, timeout_s: float | None = None) -> None:
+    async def connected(self, timeout_s: float | None = None, *, once: bool = False) -> None:
         """Waits until there is a connection.
 
+        Args:
+            timeout_s: for how long; None: without end.
+            once: whether to wait no longer than until all servers have been tried in vain.
+
         Raises:
-            HubError: there was none within `timeout_s`; its reason is that of the last attempt.
+            HubError: there was none by then; its reason is that of the last attempt. REFUSED also where one
+                server has refused in the present attempt, and others have not answered yet.
         """
-        if await self.changed.wait_until(self._stands, timeout_s):
+        await self.changed.wait_until(
+            lambda: self._stands() or (once and self._link.reason is not None), timeout_s
+        )
+        if self._stands():
             return
         if self._link.reason is HubReason.REFUSED:
             raise RefusedError(self._link.text)
+        if self._refusal:
+            raise RefusedError(self._refusal)
         raise UnreachableError(self._link.text or f"the hub does not answer within {timeout_s:g} s")
 
     async def pause(self, longest_s: float) -> None:
@@ -400,26 +412,33 @@ class Hub:
 
     async def _try_servers(self) -> Session | None:
         """Tries every server once, in random order, and the one that was lost last of all."""
+        self._refusal = ""
         servers = list(self._address.servers)
         random.shuffle(servers)
         # One that was lost because it is silent is silent to a new connection as well.
         servers.sort(key=lambda server: server == self._last_server)
         try:
-            return await first_to_open(servers, self._open_session)
+            session = await first_to_open(servers, self._open_session)
         except HubError as error:
             self._set(False, "", error)
             return None
+        self._refusal = ""
+        return session
 
     async def _open_session(self, server: str) -> Session:
         address = self._address
-        return await Session.open(
-            server,
-            credentials=address.credentials,
-            ca=address.ca,
-            inbox=address.inbox,
-            name=address.name,
-            not_taken=self.not_taken,
-        )
+        try:
+            return await Session.open(
+                server,
+                credentials=address.credentials,
+                ca=address.ca,
+                inbox=address.inbox,
+                name=address.name,
+                not_taken=self.not_taken,
+            )
+        except RefusedError as error:
+            self._refusal = str(error)
+            raise
 
     async def _use(self, session: Session) -> None:
         try:

@@ -21,8 +21,9 @@ node come to the other ones all at once: these are slow then, and further attemp
 REFUSED_AFTER_S: Final = 2.75
 """Where one server refuses, the others are waited for until this time after the last one of all was tried.
 
-As long as callers, who wait 5 s, still learn of the refusal where the last of three is tried after 2 s. No
-shorter: a node that has lost its accounts refuses all robots, and the others are slow for the reason above.
+No shorter: a node that has lost its accounts refuses all robots, and the others are slow for the reason
+above. No longer: the next attempt begins only after that. Callers, who wait 5 s, learn of the refusal in any
+case, also where this program stood still meanwhile (`Hub.connected`).
 """
 
 
@@ -69,7 +70,6 @@ async def _first(
         if not left:
             timeout_s = max(0.0, tried_s + REFUSED_AFTER_S - now_s()) if refused else None
         ended, running = await asyncio.wait(running, timeout=timeout_s, return_when=asyncio.FIRST_COMPLETED)
-        # Callers wait no longer than for the time-out of a silent one: they would not learn of the refusal.
         if refused and not left and not ended:
             break
         for attempt in ended:

@@ -82,18 +82,14 @@ class FleetSession:
         """
         # The extra `fleet` may not be installed: `with_fleet` has found out.
         from fleet.connection import FleetAddress, connect  # noqa: PLC0415
-        from fleet.errors import HubError, UnreachableError  # noqa: PLC0415
+        from fleet.errors import HubError  # noqa: PLC0415
 
         login = self.login
         address = FleetAddress(login.servers, login.credentials_file, login.ca_file, name="robotctl")
         try:
             async with connect(address) as hub:
                 # A hub whose servers have all been tried once is not waited for.
-                if not await hub.changed.wait_until(
-                    lambda: hub.link.connected or hub.link.reason is not None, ANSWERS_WITHIN_S
-                ):
-                    raise UnreachableError(f"the hub does not answer within {ANSWERS_WITHIN_S:g} s")
-                await hub.connected(0)
+                await hub.connected(ANSWERS_WITHIN_S, once=True)
                 yield hub
         except HubError as error:
             kind = HubUnreachableError if error.reason.value in _UNREACHABLE else HubRefusalError

@@ -118,9 +118,4 @@ async def first_answer(hub: Hub) -> None:
     Raises:
         HubError: the first attempt has failed.
     """
-
-    def answered() -> bool:
-        return hub.link.connected or hub.link.reason is not None
-
-    assert await hub.changed.wait_until(answered, _ANSWERS_WITHIN_S), "the hub answers"
-    await hub.connected(0.0)
+    await hub.connected(_ANSWERS_WITHIN_S, once=True)

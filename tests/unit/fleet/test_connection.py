@@ -10,8 +10,8 @@ import pytest
 
 from common.tasks import cancel
 from fleet.connection import FleetAddress, Hub
-from fleet.errors import HubError, UnreachableError
-from tests.support.virtual_time import in_virtual_time
+from fleet.errors import HubError, HubReason, RefusedError, UnreachableError
+from tests.support.virtual_time import VirtualTimeLoop, in_virtual_time
 
 _STEADY_S = 20.0
 """A connection that stood for so long was a success: there is no pause before the next one."""
@@ -106,3 +106,56 @@ async def test_a_pause_ends_with_another_connection(servers: Servers) -> None:
         begun_s = loop.time()
         await hub.pause(1000.0)
         assert loop.time() - begun_s == pytest.approx(1000.0)
+
+
+_PATIENCE_S = 5.0
+"""Of robotctl and of robot-bridge hub."""
+
+
+@asynccontextmanager
+async def refused(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Hub]:
+    """A hub whose last server refuses, while the others are silent."""
+
+    async def open_one(server: str, **_: Any) -> None:
+        if server == "c":
+            raise RefusedError("revoked")
+        await asyncio.sleep(3600.0)
+
+    monkeypatch.setattr("fleet.connection.Session", SimpleNamespace(open=open_one))
+    monkeypatch.setattr("fleet.connection.random.shuffle", lambda _servers: None)
+    hub = Hub(FleetAddress(("a", "b", "c")))
+    task = asyncio.create_task(hub.run())
+    try:
+        yield hub
+    finally:
+        await cancel([task])
+
+
+@pytest.mark.parametrize("once", [False, True])
+@pytest.mark.parametrize("stands_still_s", [0.0, 1.0, 3.0])
+@in_virtual_time
+async def test_a_refusal_is_reported_also_after_a_stall(
+    monkeypatch: pytest.MonkeyPatch, stands_still_s: float, once: bool
+) -> None:
+    """The defect: a caller's deadline could come before the end of the attempts, 0.25 s earlier."""
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualTimeLoop)
+    async with refused(monkeypatch) as hub:
+        loop.call_at(4.7, loop.spend, stands_still_s)
+        with pytest.raises(HubError, match="revoked") as raised:
+            await hub.connected(_PATIENCE_S, once=once)
+    assert raised.value.reason is HubReason.REFUSED
+
+
+@in_virtual_time
+async def test_who_tries_once_does_not_wait_for_another_attempt(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def open_one(server: str, **_: Any) -> None:
+        raise UnreachableError(f"{server} is off")
+
+    monkeypatch.setattr("fleet.connection.Session", SimpleNamespace(open=open_one))
+    hub = Hub(FleetAddress(("a",)))
+    task = asyncio.create_task(hub.run())
+    with pytest.raises(UnreachableError, match="a is off"):
+        await hub.connected(_PATIENCE_S, once=True)
+    assert asyncio.get_running_loop().time() == pytest.approx(0.0)
+    await cancel([task])
