@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -15,6 +16,7 @@ from hub import administration
 from hub.creation import HubPlan, create
 from hub.directory import HubDirectory
 from hub.server_config import Node, Places
+from tests.support.hub_patience import in_the_end
 from tests.support.nats_servers import DEBIAN_SERVER, SERVER, NatsServers
 
 BOTH_SERVERS: Final = [
@@ -51,11 +53,12 @@ class SecureHub:
     def start(self) -> None:
         """Starts the servers, and makes the streams."""
         self.servers.start_all()
-        assert asyncio.run(administration.apply(self.directory)) == []
+        assert asyncio.run(in_the_end(partial(administration.apply, self.directory))) == []
 
     def enroll(self, robot: str) -> FleetAddress:
         """Enrolls a robot; returns how it connects."""
-        asyncio.run(administration.enroll(self.directory, robot, self.path / robot))
+        enroll = partial(administration.enroll, self.directory, robot, self.path / robot)
+        asyncio.run(in_the_end(enroll))
         return self.address(self.path / robot / "bridge.creds", inbox_prefix(robot))
 
     def operator(self, name: str, *, commands: bool = False) -> FleetAddress:

@@ -95,6 +95,7 @@ async def test_existing_streams_get_more_room_and_never_less(tmp_path: Path) -> 
             assert await limits(hub) == grown
 
 
+@pytest.mark.timeout(300)  # of which the nodes may take a minute each to start, and to elect
 async def test_without_a_majority_nothing_is_acknowledged(tmp_path: Path) -> None:
     with nats_servers(tmp_path, 3) as servers:
         await _set_up(servers, 3)
@@ -119,6 +120,7 @@ def secure(tmp_path: Path) -> Iterator[SecureHub]:
         yield hub
 
 
+@pytest.mark.timeout(300)  # of which the nodes may take a minute each to start, and to elect
 async def test_people_read_at_every_node_and_go_on_without_one(secure: SecureHub) -> None:
     """Each node answers them, in the name of an account that has no streams."""
     reader = secure.operator("reader")
