@@ -55,7 +55,8 @@ LONGEST_PAUSE_S: Final = 60.0
 REQUEST_TIMEOUT_S: Final = 5.0
 """For an answer of the hub. A stream elects a leader in about that time."""
 _STEADY_S: Final = 10.0
-"""A connection that stood this long was a success: the next pause is short again."""
+"""A connection that stood this long was a success: the next pause is short again. So was reading for this
+long, though no message came: a hub that gives no answer is found out sooner."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,6 +254,7 @@ class Hub:
         pause = Backoff(FIRST_PAUSE_S, LONGEST_PAUSE_S)
         while True:
             await self.connected()
+            since_s = asyncio.get_running_loop().time()
             try:
                 following = direct.follow(self._open(), stream, subjects, place, REQUEST_TIMEOUT_S)
                 async with aclosing(following) as messages:
@@ -261,7 +263,7 @@ class Hub:
                         place = Start.after(message.sequence)
                         yield message
             except HubError:
-                await self._pause_with_jitter(pause)
+                await self._pause_with_jitter(pause, since_s)
 
     async def last(
         self, stream: str, subjects: str, timeout_s: float = REQUEST_TIMEOUT_S
@@ -286,13 +288,14 @@ class Hub:
         pause = Backoff(FIRST_PAUSE_S, LONGEST_PAUSE_S)
         while True:
             await self.connected()
+            since_s = asyncio.get_running_loop().time()
             try:
                 async with aclosing(consuming.pull(self._open(), stream, durable, batch)) as deliveries:
                     async for delivery in deliveries:
                         pause.reset()
                         yield delivery
             except HubError:
-                await self._pause_with_jitter(pause)
+                await self._pause_with_jitter(pause, since_s)
 
     async def request(self, subject: str, payload: bytes, timeout_s: float = REQUEST_TIMEOUT_S) -> bytes:
         """Sends a request to another program and returns its answer.
@@ -481,8 +484,15 @@ class Hub:
             raise UnreachableError(self._link.text or "there is no connection to the hub yet")
         return self._session
 
-    async def _pause_with_jitter(self, backoff: Backoff) -> None:
-        """As `pause`, between half and all of the next pause: a fleet does not come back in step."""
+    async def _pause_with_jitter(self, backoff: Backoff, since_s: float) -> None:
+        """As `pause`, between half and all of the next pause: a fleet does not come back in step.
+
+        Args:
+            backoff: of what has failed.
+            since_s: of the event loop's clock: since when it had been tried.
+        """
+        if asyncio.get_running_loop().time() - since_s >= _STEADY_S:
+            backoff.reset()
         await self.pause(backoff.next_s() * random.uniform(0.5, 1.0))  # noqa: S311
 
 

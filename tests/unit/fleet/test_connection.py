@@ -1,7 +1,7 @@
 """Which server comes after one that was lost, and what need not wait for long once another one answers."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import asynccontextmanager
 from types import SimpleNamespace
 from typing import Any
@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from common.tasks import cancel
-from fleet.connection import FleetAddress, Hub
+from fleet.connection import FleetAddress, Hub, Start
 from fleet.errors import HubError, HubReason, RefusedError, UnreachableError
 from tests.support.virtual_time import VirtualTimeLoop, in_virtual_time
 
@@ -106,6 +106,39 @@ async def test_a_pause_ends_with_another_connection(servers: Servers) -> None:
         begun_s = loop.time()
         await hub.pause(1000.0)
         assert loop.time() - begun_s == pytest.approx(1000.0)
+
+
+@pytest.mark.parametrize("reading", ["direct.follow", "consuming.pull"])
+@pytest.mark.parametrize(("after_s", "longest_s"), [(100.0, 1.0), (5.0, 60.0)])
+@in_virtual_time
+async def test_pauses_grow_with_failures_in_a_row_alone(
+    servers: Servers, monkeypatch: pytest.MonkeyPatch, reading: str, after_s: float, longest_s: float
+) -> None:
+    """The defect: without a message between them, some failures in a month had a person look at the past."""
+    loop = asyncio.get_running_loop()
+    begun_s: list[float] = []
+    failed_s: list[float] = []
+
+    async def fails(*_: object) -> AsyncGenerator[None, None]:
+        begun_s.append(loop.time())
+        await asyncio.sleep(after_s)
+        failed_s.append(loop.time())
+        if failed_s:
+            raise HubError(HubReason.TIMEOUT, "no answer")
+        yield
+
+    monkeypatch.setattr(f"fleet.connection.{reading}", fails)
+    async with running("a") as hub:
+        read: AsyncGenerator[object, None] = (
+            hub.follow("stream", "subject", Start.all()) if "follow" in reading else hub.pull("stream", "r1")
+        )
+        task = asyncio.ensure_future(anext(read))
+        await asyncio.sleep(12 * (after_s + longest_s))
+        await cancel([task])
+    assert len(servers.sessions) == 1
+    pauses_s = [begun - failed for failed, begun in zip(failed_s, begun_s[1:], strict=False)]
+    assert len(pauses_s) >= 10
+    assert longest_s / 2 <= max(pauses_s) <= longest_s
 
 
 _PATIENCE_S = 5.0
