@@ -10,7 +10,8 @@ from typing import Final
 
 import pytest
 
-from fleet.connection import FleetAddress, Hub
+from fleet.connection import FleetAddress, Hub, connect
+from fleet.errors import HubError, HubReason
 from fleet.names import inbox_prefix
 from hub import administration
 from hub.creation import HubPlan, create
@@ -122,3 +123,17 @@ async def first_answer(hub: Hub) -> None:
         HubError: the first attempt has failed.
     """
     await hub.connected(_ANSWERS_WITHIN_S, once=True)
+
+
+def answer_to(address: FleetAddress) -> HubReason | None:
+    """Returns why there is no connection, UNREACHABLE also where nothing answers; None: there is one."""
+
+    async def answer() -> HubReason | None:
+        async with connect(address) as hub:
+            try:
+                await first_answer(hub)
+            except HubError as error:
+                return error.reason
+            return None
+
+    return asyncio.run(answer())

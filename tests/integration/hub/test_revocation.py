@@ -1,6 +1,7 @@
 """Who is revoked stays out, whatever becomes of the servers' disks."""
 
 import asyncio
+import itertools
 import shutil
 import time
 from collections.abc import Callable, Iterator
@@ -19,7 +20,8 @@ from fleet.connection import FleetAddress, connect
 from fleet.errors import HubError, HubReason
 from hub import accounts, administration
 from hub.cli import app
-from tests.support.secure_hub import BOTH_SERVERS, SecureHub, secure_hub
+from tests.support.promise import keeps, keeps_async
+from tests.support.secure_hub import BOTH_SERVERS, SecureHub, answer_to, secure_hub
 from tests.support.waiting import wait_until
 
 _REVOKED_WITHIN_S = 5.0
@@ -145,36 +147,52 @@ def test_a_key_that_takes_all_connections_of_robots_is_revoked(small: SecureHub)
 
 
 @pytest.mark.timed
-def test_a_revoked_robot_is_out_of_every_node(cluster: SecureHub) -> None:
-    robot = cluster.enroll("r1")
-    nodes = [_at(cluster, robot, node) for node in range(3)]
+@pytest.mark.timeout(300)  # up to four attempts, after a cluster has started
+async def test_a_revoked_robot_is_out_of_every_node(cluster: SecureHub) -> None:
+    robots = (f"r{number}" for number in itertools.count())
 
-    async def longest_s() -> float:
+    async def out_s() -> float:
+        name = next(robots)
+        robot = await asyncio.to_thread(cluster.enroll, name)
+        nodes = [_at(cluster, robot, node) for node in range(3)]
         async with AsyncExitStack() as stack:
             hubs = [await stack.enter_async_context(connect(each)) for each in nodes]
             for hub in hubs:
-                await hub.connected(10.0)
+                await hub.connected(20.0)
             begun_s = time.monotonic()
-            await administration.revoke(cluster.directory, "robot", "r1")
+            await administration.revoke(cluster.directory, "robot", name)
             for hub in hubs:
-                left_s = _REVOKED_WITHIN_S - (time.monotonic() - begun_s)
-                assert await hub.changed.wait_until(lambda hub=hub: not hub.link.connected, left_s)  # type: ignore[misc]
-            return time.monotonic() - begun_s
+                assert await hub.changed.wait_until(lambda hub=hub: not hub.link.connected, 30.0)  # type: ignore[misc]
+            needed_s = time.monotonic() - begun_s
+        for each in nodes:
+            assert not await asyncio.to_thread(_admits, each)
+        return needed_s
 
-    assert asyncio.run(longest_s()) < _REVOKED_WITHIN_S
-    assert not any(_admits(each) for each in nodes)
+    await keeps_async(_REVOKED_WITHIN_S, "s until a revoked robot is out of every node", out_s)
 
 
 @pytest.mark.timed
+@pytest.mark.timeout(300)  # up to four attempts of 15 s each, after a cluster has started
 def test_a_node_that_was_down_learns_of_it_from_the_others(cluster: SecureHub) -> None:
-    robot, other = cluster.enroll("r1"), cluster.enroll("r2")
-    cluster.servers.kill(2)
-    # Until the list of robots has a leader again, the administrator is to try again.
-    wait_until(lambda: _revoked(cluster, "r1"), "the robot is revoked", 30.0)
-    cluster.servers.start(2)
-    refused = partial(_answer, _at(cluster, robot, 2))
-    wait_until(lambda: refused() is HubReason.REFUSED, "node 2 refuses it", _LEARNED_WITHIN_S)
-    assert _admits(_at(cluster, other, 2))
+    robots = (f"r{number}" for number in itertools.count())
+    other = cluster.enroll("other")
+
+    def learned_s() -> float:
+        name = next(robots)
+        robot = cluster.enroll(name)
+        cluster.servers.kill(2)
+        # Until the list of robots has a leader again, the administrator is to try again.
+        wait_until(lambda: _revoked(cluster, name), "the robot is revoked", 60.0)
+        begun_s = time.monotonic()
+        cluster.servers.start(2)
+        refused = partial(answer_to, _at(cluster, robot, 2))
+        wait_until(lambda: refused() is HubReason.REFUSED, "node 2 refuses it", 60.0)
+        needed_s = time.monotonic() - begun_s
+        assert _admits(_at(cluster, other, 2))
+        cluster.servers.wait_healthy()
+        return needed_s
+
+    keeps(_LEARNED_WITHIN_S, "s until a node that was down refuses who was revoked meanwhile", learned_s)
 
 
 @pytest.mark.timed
@@ -186,10 +204,11 @@ def test_a_node_that_was_down_brings_no_older_accounts(
     monkeypatch.setattr(administration, "_now_s", partial(int, time.time()))
     assert asyncio.run(administration.apply(cluster.directory)) == []
     cluster.servers.kill(2)
-    wait_until(lambda: _revoked(cluster, "r1"), "the robot is revoked", 30.0)
+    wait_until(lambda: _revoked(cluster, "r1"), "the robot is revoked", 60.0)
     cluster.servers.start(2)
-    refused = partial(_answer, _at(cluster, robot, 2))
-    wait_until(lambda: refused() is HubReason.REFUSED, "node 2 refuses it", _LEARNED_WITHIN_S)
+    refused = partial(answer_to, _at(cluster, robot, 2))
+    # How long that may take is measured above.
+    wait_until(lambda: refused() is HubReason.REFUSED, "node 2 refuses it", 60.0)
     compared_s = time.monotonic() + 2 * _COMPARED_EVERY_S
     while time.monotonic() < compared_s:
         assert not any(_admits(_at(cluster, robot, node)) for node in range(3))
@@ -223,19 +242,6 @@ def _revoked(hub: SecureHub, robot: str) -> bool:
 
 
 def _admits(address: FleetAddress) -> bool:
-    reason = _answer(address)
+    reason = answer_to(address)
     assert reason in {None, HubReason.REFUSED}
     return reason is None
-
-
-def _answer(address: FleetAddress) -> HubReason | None:
-    """Why there is no connection; None: there is one."""
-
-    async def answer() -> HubReason | None:
-        async with connect(address) as robot:
-            await robot.changed.wait_until(
-                lambda: robot.link.connected or robot.link.reason is not None, 10.0
-            )
-            return robot.link.reason
-
-    return asyncio.run(answer())

@@ -16,7 +16,7 @@ from fleet.connection import FleetAddress, connect
 from fleet.errors import HubReason
 from hub import administration
 from tests.support.promise import keeps, keeps_async
-from tests.support.secure_hub import SecureHub, secure_hub
+from tests.support.secure_hub import SecureHub, answer_to, secure_hub
 from tests.support.silent_server import tried_in_order
 from tests.support.waiting import wait_until
 
@@ -61,8 +61,8 @@ def test_it_keeps_the_administration_from_nothing(
     other = cluster.enroll("r2")
     assert asyncio.run(administration.apply(cluster.directory)) == []
     for node in {0, 1, 2} - {frozen}:
-        assert _answer(_at(cluster, robot, node)) is HubReason.REFUSED
-        assert _answer(_at(cluster, other, node)) is None
+        assert answer_to(_at(cluster, robot, node)) is HubReason.REFUSED
+        assert answer_to(_at(cluster, other, node)) is None
 
 
 @pytest.mark.timed
@@ -102,7 +102,7 @@ def test_when_it_goes_on_it_learns_who_is_revoked(cluster: SecureHub) -> None:
         asyncio.run(administration.revoke(cluster.directory, "robot", name))
         cluster.servers.thaw(node)
         begun_s = time.monotonic()
-        refused = partial(_answer, _at(cluster, robot, node))
+        refused = partial(answer_to, _at(cluster, robot, node))
         wait_until(lambda: refused() is HubReason.REFUSED, f"node {node} refuses it", 60.0)
         return time.monotonic() - begun_s
 
@@ -111,16 +111,3 @@ def test_when_it_goes_on_it_learns_who_is_revoked(cluster: SecureHub) -> None:
 
 def _at(hub: SecureHub, address: FleetAddress, node: int) -> FleetAddress:
     return replace(address, servers=(hub.servers.urls[node],))
-
-
-def _answer(address: FleetAddress) -> HubReason | None:
-    """Why there is no connection; None: there is one."""
-
-    async def answer() -> HubReason | None:
-        async with connect(address) as robot:
-            assert await robot.changed.wait_until(
-                lambda: robot.link.connected or robot.link.reason is not None, 20.0
-            )
-            return robot.link.reason
-
-    return asyncio.run(answer())
