@@ -493,6 +493,9 @@ def _connect_error(server: str, error: Exception) -> HubError:
     if "connections exceeded" in text:
         # Of the server, or of the account; the credentials are as good as before.
         return UnreachableError(f"{server} has as many connections as it permits: {text}")
+    if "authentication timeout" in text:
+        # Said by a server that has waited for the login for longer than it does.
+        return UnreachableError(f"{server} can't be reached: the login took too long ({text})")
     if any(word in text for word in _REFUSALS) or isinstance(error, nats_errors.AuthorizationError):
         return RefusedError(
             f"{server} does not accept the credentials ({text}): revoked, expired, or not of this hub"

@@ -87,6 +87,15 @@ async def test_a_status_of_another_client_is_none() -> None:
             await session.close()
 
 
+async def test_a_server_that_gives_up_a_slow_login_does_not_refuse_it() -> None:
+    """The defect: who logged in from a computer that stood still was sent for a new login."""
+    async with hostile_server(lambda _number, _reply: b"") as server:
+        server.info += b"-ERR 'Authentication Timeout'\r\n"
+        with pytest.raises(HubError, match="the login took too long") as slow:
+            await _session(server)
+    assert slow.value.reason is HubReason.UNREACHABLE
+
+
 async def test_a_hub_that_ends_every_request_is_not_asked_without_pause() -> None:
     requests = 0
 
