@@ -117,12 +117,17 @@ def secure_hub(directory: Path, nodes: int = 1, binary: Path | str = SERVER) -> 
 
 
 async def first_answer(hub: Hub) -> None:
-    """Returns when there is a connection.
+    """Returns when there is a connection. A server that gives up a client which stood still is tried again.
 
     Raises:
-        HubError: the first attempt has failed.
+        HubError: the hub refuses, or nothing answers in time.
     """
-    await hub.connected(_ANSWERS_WITHIN_S, once=True)
+
+    def answered() -> bool:
+        return hub.link.connected or hub.link.reason is HubReason.REFUSED
+
+    await hub.changed.wait_until(answered, _ANSWERS_WITHIN_S)
+    await hub.connected(0.0)
 
 
 def answer_to(address: FleetAddress) -> HubReason | None:

@@ -272,7 +272,7 @@ async def test_a_server_without_tls_gets_no_credentials(thief: FleetAddress) -> 
         url = f"tls://127.0.0.1:{server.sockets[0].getsockname()[1]}"
         async with connect(replace(thief, servers=(url,))) as robot:
             with pytest.raises(HubError) as refused:
-                await first_answer(robot)
+                await robot.connected(20.0, once=True)
     assert refused.value.reason is HubReason.UNREACHABLE
     assert "does not offer TLS" in str(refused.value)
     assert said == b""
