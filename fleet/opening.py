@@ -1,7 +1,7 @@
 """Opens a session with the first of several servers that answers, so that a silent one costs a moment.
 
 A server that has no power, or stands still, answers nothing: an attempt at it ends with its time-out
-(fleet/session.py). The next one is tried beside it, as RFC 8305 has it for the addresses of a host.
+(fleet/nats_client.py). The next one is tried beside it, as RFC 8305 has it for the addresses of a host.
 """
 
 import asyncio

@@ -292,7 +292,7 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
         ),
         ("zstandard", ("recorder/mcap/",)),
         ("psutil", ("gateway/platform",)),
-        ("nats", ("fleet/session.py",)),
+        ("nats", ("fleet/nats_client.py",)),
         ("nkeys", ("fleet/identity.py",)),
         ("nacl", ("fleet/receipts.py", "fleet/receipt_keys.py")),
         ("boto3", ("hub/receiver/",)),

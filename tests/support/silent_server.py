@@ -17,4 +17,4 @@ def silent_server() -> Iterator[str]:
 def tried_in_order(monkeypatch: pytest.MonkeyPatch) -> None:
     """Has the servers of a hub tried as they are listed; a silent one is waited for a minute, not 5 s."""
     monkeypatch.setattr("fleet.connection.random.shuffle", lambda _servers: None)
-    monkeypatch.setattr("fleet.session.CONNECT_TIMEOUT_S", 60.0)
+    monkeypatch.setattr("fleet.nats_client.CONNECT_TIMEOUT_S", 60.0)

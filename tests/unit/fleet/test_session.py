@@ -9,14 +9,16 @@ import pytest
 
 from fleet import session
 from fleet.errors import UnreachableError
+from fleet.nats_client import NatsClient
+from fleet.replies import NotTaken
 from fleet.session import Session
 
 
-class _Connecting(session._Client):
+class _Connecting(NatsClient):
     """Connects when a test says so, and waits as the library does."""
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, *args: Any) -> None:
+        super().__init__(*args)
         self.connected = asyncio.get_running_loop().create_future()
 
     async def connect(self, *_: Any, **__: Any) -> None:
@@ -32,13 +34,18 @@ class _Connecting(session._Client):
 async def test_a_cancellation_that_comes_with_the_connection_is_not_lost(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    client = _Connecting()
-    monkeypatch.setattr(session, "_Client", lambda: client)
+    clients: list[_Connecting] = []
+
+    def client(*args: Any) -> _Connecting:
+        clients.append(_Connecting(*args))
+        return clients[-1]
+
+    monkeypatch.setattr(session, "NatsClient", client)
     opening = asyncio.create_task(
         Session.open("nats://127.0.0.1:1", credentials=None, ca=None, inbox="_INBOX", name="")
     )
     await asyncio.sleep(0)
-    client.connected.set_result(None)
+    clients[0].connected.set_result(None)
     opening.cancel()
     with pytest.raises(asyncio.CancelledError):
         await opening
@@ -46,8 +53,8 @@ async def test_a_cancellation_that_comes_with_the_connection_is_not_lost(
 
 async def test_an_error_that_many_calls_raise_does_not_grow_with_them() -> None:
     """The defect: it kept the place of each, and to print it took minutes."""
-    lost = Session(_Connecting(), "nats://127.0.0.1:1", "_INBOX")
-    lost.note_closed(None)
+    lost = Session("nats://127.0.0.1:1", "_INBOX", NotTaken())
+    lost.on_lost(UnreachableError("it can't be reached"))
     places = []
     for _ in range(3):
         for call in (partial(lost.publish, "a", b""), partial(lost.request, "a", b"", 1.0)):
