@@ -21,8 +21,9 @@ from gateway.config import SourceSettings
 from gateway.ros.field_types import FieldMissingError, check_field
 from gateway.ros.readers.field_path import steps_of, value_at
 from hub.exporter.collector import FleetCollector
-from hub.receiver.service import Party, ReceiverService
+from hub.receiver.service import ReceiverService
 from hub.receiver.store import Store, StoredObject, StoredPart, StoreError, StoreProblem
+from hub.receiver.verified import Party
 from omniseer.fleet.v1 import upload_pb2
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus
 from tests.support.control_characters import CONTROL_CHARACTERS

@@ -20,8 +20,9 @@ from fleet.receipt_keys import read_public_keys, read_signer
 from fleet.serving import Handler, Request
 from hub.receiver.config import ReceiverSettings
 from hub.receiver.metrics import ReceiverMetrics
-from hub.receiver.service import THREADS, Party, ReceiverService, busy
+from hub.receiver.service import ReceiverService, busy
 from hub.receiver.store import Store, StoreError
+from hub.receiver.verified import THREADS, Party
 from omniseer.fleet.v1.upload_pb2 import UploadResponse
 
 _log = logging.getLogger(__name__)

@@ -12,8 +12,8 @@ from fleet.names import ROBOT_NAME
 from hub.receiver.app import party_of
 from hub.receiver.config import ReceiverSettings
 from hub.receiver.keys import BadNameError
-from hub.receiver.service import THREADS, ReceiverService, Refusal
 from hub.receiver.store import Store, StoreError
+from hub.receiver.verified import THREADS, Refusal, StoreCalls, Verified
 
 MOST: Final = 100_000
 """Recordings of one run; a console reads no more of the list."""
@@ -48,8 +48,8 @@ async def relist(settings: ReceiverSettings) -> Relisted:
         with ThreadPoolExecutor(THREADS, thread_name_prefix="store") as threads:
             async with connect(address) as hub:
                 await hub.connected(_CONNECT_S)
-                service = ReceiverService(party_of(settings), store, hub, threads)
-                return await _relist(service, store, settings.fleet)
+                verified = Verified(party_of(settings), store, hub, StoreCalls(threads))
+                return await _relist(verified, store, settings.fleet)
     except (StoreError, Refusal) as error:
         raise UserError(
             f"not all recordings could be listed: {error}", "Repeat it, it begins anew"
@@ -58,15 +58,15 @@ async def relist(settings: ReceiverSettings) -> Relisted:
         store.close()
 
 
-async def _relist(service: ReceiverService, store: Store, fleet: str) -> Relisted:
+async def _relist(verified: Verified, store: Store, fleet: str) -> Relisted:
     found = await asyncio.to_thread(lambda: list(islice(store.recordings(f"{fleet}/"), MOST)))
     listed, left_out = 0, []
     for robot, recording_id in found:
         try:
-            verified = bool(ROBOT_NAME.fullmatch(robot)) and await service.list_again(robot, recording_id)
+            counts = bool(ROBOT_NAME.fullmatch(robot)) and await verified.list_again(robot, recording_id)
         except BadNameError:
-            verified = False
-        if verified:
+            counts = False
+        if counts:
             listed += 1
         else:
             left_out.append(f"{robot}/{recording_id}")

@@ -20,76 +20,29 @@ import asyncio
 import hashlib
 import logging
 import threading
-import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import Any, Final, ParamSpec, Protocol, TypeVar
+from typing import Any, Final
 
 from google.protobuf.message import DecodeError, Message
 
-from fleet.errors import HubError, HubReason
-from fleet.names import LARGEST_MESSAGE, MOST_FILES, RECORDINGS
-from fleet.receipt_keys import ReceiptError, ReceiptSigner, confirmed, digest_of
-from hub.receiver.keys import BadNameError, RecordingKeys, checked
+from fleet.names import LARGEST_MESSAGE, MOST_FILES
+from fleet.receipt_keys import digest_of
+from hub.receiver.keys import BadNameError, checked
 from hub.receiver.store import PART_BYTES, URL_VALID_S, Store, StoredObject, StoreError, StoreProblem
+from hub.receiver.verified import Party, Records, Refusal, StoreCalls, Verified, not_verified
 from omniseer.fleet.v1 import upload_pb2 as pb
 from omniseer.gateway.v1.recording_pb2 import Recording, RecordingFile
 
 _log = logging.getLogger(__name__)
-_P = ParamSpec("_P")
-_T = TypeVar("_T")
 
-THREADS: Final = 16
-"""Calls of the store at once."""
 PROGRESS_S: Final = 2.0
 _MOST_URLS: Final = 16
 _MOST_PARTS: Final = 10_000
 _LONGEST_ID: Final = 2048
 _LONGEST_ETAG: Final = 128
-_RECEIPT_BYTES: Final = 8192
-_RECORD_BYTES: Final = 4 * 1024 * 1024
-_MOST_IN_RECORD: Final = LARGEST_MESSAGE
-"""Of a StoredRecording in the bucket, in bytes; a larger one is listed without its files."""
 _SHORTEST_S: Final = 600.0
 _SLOWEST_BYTES_PER_S: Final = 1024 * 1024
-_AT_ONCE: Final = 8
-"""Receipts that are read at once."""
-
-
-class Refusal(Exception):  # noqa: N818  # it is an answer
-    """A request that is not carried out.
-
-    Args:
-        code: Why, for the robot.
-        text: Why, for people.
-    """
-
-    def __init__(self, code: pb.UploadErrorCode.ValueType, text: str) -> None:
-        super().__init__(text)
-        self.code = code
-
-
-class Records(Protocol):
-    """Where verified recordings are listed (fleet.connection.Hub)."""
-
-    async def put(self, bucket: str, key: str, value: bytes) -> None:
-        """Sets a key, or raises a `HubError`."""
-
-
-@dataclass(frozen=True, slots=True)
-class Party:
-    """As whom a receiver confirms.
-
-    Attributes:
-        fleet: Name of the fleet's account.
-        signer: Signs its receipts.
-        public_keys: Whose receipts count, its own among them.
-    """
-
-    fleet: str
-    signer: ReceiptSigner
-    public_keys: tuple[bytes, ...]
 
 
 _Send = Callable[[Message], Awaitable[None]]
@@ -107,7 +60,9 @@ class ReceiverService:
     """
 
     def __init__(self, party: Party, store: Store, records: Records, threads: ThreadPoolExecutor) -> None:
-        self._party, self._store, self._records, self._threads = party, store, records, threads
+        self._store = store
+        self._call = StoreCalls(threads)
+        self._verified = Verified(party, store, records, self._call)
         self.bytes_read = 0
         """Bytes of recordings that were read again, since the start."""
         self._methods: Mapping[str, tuple[type[Any], Callable[..., Awaitable[Message]]]] = {
@@ -171,32 +126,19 @@ class ReceiverService:
         await send(pb.UploadResponse(error=pb.UploadError(code=refusal.code, message=str(refusal))))
         return code.lower()
 
-    async def list_again(self, robot: str, recording_id: str) -> bool:
-        """Lists a recording of the store in the hub's bucket; returns whether it is verified.
-
-        Raises:
-            BadNameError: No recording has such an ID.
-            StoreError: The store does not answer.
-            Refusal: The hub has no place for it.
-            HubError: The hub does not answer.
-        """
-        stored = await self._verified(robot, self._keys(robot, recording_id))
-        if stored:
-            await self._list(robot, stored)
-        return stored is not None
-
     async def _begin_upload(self, robot: str, request: pb.BeginUploadRequest, _send: _Send) -> Message:
         recording = request.recording
-        if stored := await self._verified(robot, self._keys(robot, recording.id), recording):
+        keys = self._verified.keys(robot, recording.id)
+        if stored := await self._verified.recording(keys, recording):
             # The bucket may have lost it.
-            await self._list(robot, stored)
+            await self._verified.enlist(keys, stored)
             return pb.BeginUploadResponse(receipt=stored.receipt)
         return pb.BeginUploadResponse()
 
     async def _begin_file(self, robot: str, request: pb.BeginFileRequest, _send: _Send) -> Message:
         file = _checked_file(request.file)
-        keys = self._keys(robot, request.recording_id)
-        if receipt := await self._receipt(robot, keys, file):
+        keys = self._verified.keys(robot, request.recording_id)
+        if receipt := await self._verified.file(keys, file):
             return pb.BeginFileResponse(receipt=receipt)
         found = await self._call(self._store.find, keys.file(file.name))
         if file.size == 0:
@@ -213,7 +155,7 @@ class ReceiverService:
         return pb.BeginFileResponse(upload_id=upload_id, part_size=PART_BYTES, parts=whole)
 
     async def _get_parts(self, robot: str, request: pb.GetPartsRequest, _send: _Send) -> Message:
-        key = self._keys(robot, request.recording_id).file(request.file_name)
+        key = self._verified.keys(robot, request.recording_id).file(request.file_name)
         numbers, most = request.numbers, _part_count(request.file_size)
         if not 0 < len(numbers) <= _MOST_URLS or not all(0 < number <= most for number in numbers):
             raise Refusal(pb.UPLOAD_ERROR_CODE_INVALID, f"1 to {_MOST_URLS} parts of the file at once")
@@ -235,7 +177,7 @@ class ReceiverService:
         return pb.GetPartsResponse(urls=urls)
 
     async def _get_files(self, robot: str, request: pb.GetFilesRequest, _send: _Send) -> Message:
-        keys, names = self._keys(robot, request.recording_id), request.file_names
+        keys, names = self._verified.keys(robot, request.recording_id), request.file_names
         if len(names) > _MOST_URLS:
             raise Refusal(pb.UPLOAD_ERROR_CODE_INVALID, f"at most {_MOST_URLS} files at once")
         # An object and what shows that it is verified. The receipt itself is checked where the file is read.
@@ -243,13 +185,13 @@ class ReceiverService:
         urls = []
         for name, key, proof in wanted or [("", keys.recording, keys.recording)]:
             if not await self._call(self._store.find, proof):
-                raise _not_verified(name or request.recording_id)
+                raise not_verified(name or request.recording_id)
             url = await self._call(self._store.file_url, key)
             urls.append(pb.FileUrl(file_name=name, url=url, expires_in_s=URL_VALID_S))
         return pb.GetFilesResponse(urls=urls)
 
     async def _complete_file(self, robot: str, request: pb.CompleteFileRequest, _send: _Send) -> Message:
-        keys = self._keys(robot, request.recording_id)
+        keys = self._verified.keys(robot, request.recording_id)
         key = keys.file(request.file_name)
         parts = [(part.number, part.etag) for part in request.parts]
         if (
@@ -271,8 +213,8 @@ class ReceiverService:
 
     async def _verify_file(self, robot: str, request: pb.VerifyFileRequest, send: _Send) -> Message:
         file = _checked_file(request.file)
-        keys = self._keys(robot, request.recording_id)
-        if receipt := await self._receipt(robot, keys, file):
+        keys = self._verified.keys(robot, request.recording_id)
+        if receipt := await self._verified.file(keys, file):
             return pb.VerifyFileResponse(receipt=receipt)
         key = keys.file(file.name)
         found = await self._call(self._store.find, key)
@@ -280,8 +222,7 @@ class ReceiverService:
             raise Refusal(pb.UPLOAD_ERROR_CODE_NO_SUCH_UPLOAD, "the file is not in the store")
         if found.size != file.size or await self._digest(key, found, send) != file.sha256:
             await self._delete(key, found)
-        expected = self._receipt_of(robot, Recording(id=request.recording_id), file)
-        receipt = self._sign(expected, self._store.location(key))
+        receipt = self._verified.confirm(keys, file, self._store.location(key))
         await self._call(self._store.write, keys.receipt(file.name), receipt.SerializeToString())
         if await self._call(self._store.find, key) != found:
             await self._forget(keys.receipt(file.name))
@@ -336,13 +277,13 @@ class ReceiverService:
 
     async def _complete_upload(self, robot: str, request: pb.CompleteUploadRequest, send: _Send) -> Message:
         recording, names = request.recording, sorted(set(request.file_names))
-        keys = self._keys(robot, recording.id)
+        keys = self._verified.keys(robot, recording.id)
         if not 0 < len(names) <= MOST_FILES:
             raise Refusal(pb.UPLOAD_ERROR_CODE_INVALID, f"a recording has 1 to {MOST_FILES} files")
         for name in names:
             checked(name)
         files: list[RecordingFile] = []
-        task = asyncio.ensure_future(self._read_receipts(robot, keys, names, files))
+        task = asyncio.ensure_future(self._verified.read_receipts(keys, names, files))
         try:
             async with asyncio.timeout(_SHORTEST_S + len(names)):
                 async for _ in _every(PROGRESS_S, task):
@@ -354,129 +295,16 @@ class ReceiverService:
         if digest_of(files) != recording.sha256 or size != recording.size:
             text = "the files that are verified are not those of the recording"
             raise Refusal(pb.UPLOAD_ERROR_CODE_NOT_VERIFIED, text)
-        if missing := await self._missing(keys, files):
-            raise _not_verified(missing)
-        location = self._store.location(keys.folder)
-        receipt = self._sign(self._receipt_of(robot, recording), location)
+        if missing := await self._verified.missing(keys, files):
+            raise not_verified(missing)
+        receipt = self._verified.confirm(keys, recording, self._store.location(keys.folder))
         plain = Recording.FromString(recording.SerializeToString())
         plain.ClearField("files")
         plain.ClearField("gaps")
         stored = pb.StoredRecording(recording=plain, receipt=receipt, files=files)
         await self._call(self._store.write, keys.recording, stored.SerializeToString())
-        await self._list(robot, stored)
+        await self._verified.enlist(keys, stored)
         return pb.CompleteUploadResponse(receipt=receipt)
-
-    async def _read_receipts(
-        self, robot: str, keys: RecordingKeys, names: list[str], files: list[RecordingFile]
-    ) -> None:
-        """Adds each file that has a receipt."""
-        for begin in range(0, len(names), _AT_ONCE):
-            some = names[begin : begin + _AT_ONCE]
-            contents = await asyncio.gather(
-                *(self._call(self._store.read, keys.receipt(name), _RECEIPT_BYTES) for name in some)
-            )
-            for name, content in zip(some, contents, strict=True):
-                signed = _parsed(pb.SignedReceipt, content or b"")
-                receipt = _parsed(pb.Receipt, signed.receipt if signed else b"")
-                if not signed or not receipt:
-                    raise _not_verified(name)
-                file = RecordingFile(name=name, size=receipt.size, sha256=receipt.sha256, final=True)
-                if not self._counts(signed, self._receipt_of(robot, Recording(id=keys.recording_id), file)):
-                    raise _not_verified(name)
-                files.append(file)
-
-    async def _missing(self, keys: RecordingKeys, files: Iterable[RecordingFile]) -> str:
-        """Returns the name of a file that is not in the store with its size; empty if all are."""
-        sizes = await self._call(self._store.sizes, f"{keys.folder}/", 2 * MOST_FILES)
-        return next((file.name for file in files if sizes.get(keys.file(file.name)) != file.size), "")
-
-    async def _verified(
-        self, robot: str, keys: RecordingKeys, recording: Recording | None = None
-    ) -> pb.StoredRecording | None:
-        """Returns a recording as the store has it, with a receipt that counts; None if it is not verified.
-
-        Args:
-            robot: Whose it is.
-            keys: Where it is.
-            recording: The content that it is to have; None: any.
-        """
-        content = await self._call(self._store.read, keys.recording, _RECORD_BYTES)
-        stored = _parsed(pb.StoredRecording, content) if content else None
-        if stored is None or stored.recording.id != keys.recording_id:
-            return None
-        if not self._counts(stored.receipt, self._receipt_of(robot, recording or stored.recording)):
-            return None
-        return None if await self._missing(keys, stored.files) else stored
-
-    async def _receipt(self, robot: str, keys: RecordingKeys, file: RecordingFile) -> pb.SignedReceipt | None:
-        """Returns the receipt of a file that is in the store, if there is one.
-
-        Raises:
-            Refusal: There is one, of other content.
-        """
-        content = await self._call(self._store.read, keys.receipt(file.name), _RECEIPT_BYTES)
-        signed = _parsed(pb.SignedReceipt, content) if content else None
-        verified = _parsed(pb.Receipt, signed.receipt) if signed else None
-        if not signed or not verified or not self._counts(signed, verified):
-            return None
-        found = await self._call(self._store.find, keys.file(file.name))
-        if found is None or found.size != verified.size:
-            return None
-        if self._counts(signed, self._receipt_of(robot, Recording(id=keys.recording_id), file)):
-            return signed
-        text = f"{file.name} was verified with other content before, which is kept"
-        raise Refusal(pb.UPLOAD_ERROR_CODE_INVALID, text)
-
-    def _counts(self, signed: pb.SignedReceipt, expected: pb.Receipt) -> bool:
-        try:
-            confirmed(signed, self._party.public_keys, expected)
-        except ReceiptError:
-            return False
-        return True
-
-    def _receipt_of(self, robot: str, recording: Recording, file: RecordingFile | None = None) -> pb.Receipt:
-        """Returns what is to be confirmed of a file, or of a recording."""
-        return pb.Receipt(
-            fleet=self._party.fleet,
-            robot=robot,
-            recording_id=recording.id,
-            file_name=file.name if file else "",
-            size=file.size if file else recording.size,
-            sha256=file.sha256 if file else recording.sha256,
-        )
-
-    def _sign(self, receipt: pb.Receipt, location: str) -> pb.SignedReceipt:
-        receipt.verified_unix_ms = time.time_ns() // 1_000_000
-        receipt.location = location
-        return self._party.signer.sign(receipt)
-
-    async def _list(self, robot: str, stored: pb.StoredRecording) -> None:
-        """Lists a recording in the hub's bucket.
-
-        Raises:
-            Refusal: The hub has no place for it.
-            HubError: The hub does not answer.
-        """
-        if stored.ByteSize() > _MOST_IN_RECORD:
-            stored = pb.StoredRecording(recording=stored.recording, receipt=stored.receipt)
-        try:
-            await self._records.put(RECORDINGS, f"{robot}.{stored.recording.id}", stored.SerializeToString())
-        except HubError as error:
-            if error.reason is HubReason.TOO_LARGE:
-                text = "the description of the recording is too large for the hub"
-                raise Refusal(pb.UPLOAD_ERROR_CODE_INVALID, text) from error
-            if error.reason is HubReason.FULL:
-                text = "the hub's list of recordings is full"
-                raise Refusal(pb.UPLOAD_ERROR_CODE_STORE, text) from error
-            raise
-
-    def _keys(self, robot: str, recording_id: str) -> RecordingKeys:
-        return RecordingKeys(self._party.fleet, robot, recording_id)
-
-    async def _call(self, work: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Returns the result of a call of the store."""
-        loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._threads, lambda: work(*args, **kwargs))
 
 
 _CODES: Final = {
@@ -530,20 +358,5 @@ def _part_size(size: int, number: int) -> int:
     return min(PART_BYTES, size - (number - 1) * PART_BYTES)
 
 
-def _not_verified(name: str) -> Refusal:
-    return Refusal(pb.UPLOAD_ERROR_CODE_NOT_VERIFIED, f"{name!a} is not verified")
-
-
 def _changed() -> Refusal:
     return Refusal(pb.UPLOAD_ERROR_CODE_STORE, "the file has changed while it was read")
-
-
-_M = TypeVar("_M", bound=Message)
-
-
-def _parsed(kind: type[_M], content: bytes) -> _M | None:
-    """Returns a message; None if it is none, or an empty one."""
-    try:
-        return kind.FromString(content) if content else None
-    except DecodeError:
-        return None

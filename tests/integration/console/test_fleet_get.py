@@ -15,7 +15,7 @@ from fleet import names
 from fleet.connection import Hub, connect
 from fleet.receipt_keys import ReceiptSigner, new_seed
 from hub import administration
-from hub.receiver import service
+from hub.receiver import verified
 from omniseer.fleet.v1 import upload_pb2 as pb
 from tests.support.eventually import eventually
 from tests.support.robotctl import ROBOTCTL, environment, robotctl_process
@@ -241,7 +241,7 @@ async def test_a_recording_of_many_files_is_read_by_the_stores_own_list(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # As with thousands of files, of which the hub's entry has none.
-    monkeypatch.setattr(service, "_MOST_IN_RECORD", 0)
+    monkeypatch.setattr(verified, "_MOST_IN_RECORD", 0)
     async with stored(ground):
         done = await laptop.got()
         assert (done["files"], laptop.files()) == (3, FILES)

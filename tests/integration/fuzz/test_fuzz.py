@@ -54,7 +54,7 @@ def test_the_lines_of_every_package_that_a_target_imports_guide_the_fuzzer() -> 
 
 
 def test_the_receivers_store_in_memory_has_all_that_the_receiver_calls() -> None:
-    source = (ROOT / "hub/receiver/service.py").read_text()
+    source = "".join((ROOT / f"hub/receiver/{name}.py").read_text() for name in ("service", "verified"))
     called = set(re.findall(r"self\._store\.(\w+)", source))
     assert "create" in called
     assert called <= set(vars(vars(fleet)["_Store"]))

@@ -14,8 +14,9 @@ from fleet.connection import connect
 from fleet.names import RECEIVERS, UPLOAD_SUBJECTS
 from fleet.receipt_keys import read_signer
 from fleet.serving import Request
-from hub.receiver.service import THREADS, Party, ReceiverService
+from hub.receiver.service import ReceiverService
 from hub.receiver.store import Store
+from hub.receiver.verified import THREADS, Party
 from omniseer.fleet.v1.upload_pb2 import UploadResponse
 from tests.support.eventually import eventually
 from tests.support.helper import first_line

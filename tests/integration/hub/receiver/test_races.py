@@ -12,8 +12,9 @@ import pytest
 from google.protobuf.message import Message
 
 from fleet.receipt_keys import ReceiptSigner, confirmed
-from hub.receiver.service import THREADS, Party, ReceiverService
+from hub.receiver.service import ReceiverService
 from hub.receiver.store import Store
+from hub.receiver.verified import THREADS, Party
 from omniseer.fleet.v1 import upload_pb2 as pb
 from omniseer.gateway.v1.recording_pb2 import RecordingFile
 from tests.support.s3_server import S3Server

@@ -13,8 +13,9 @@ from bridge.uploads.config import UploadSettings
 from bridge.uploads.parts import PartSender
 from bridge.uploads.problems import AttemptError
 from bridge.uploads.receivers import Receivers
-from hub.receiver.service import THREADS, Party, ReceiverService
+from hub.receiver.service import ReceiverService
 from hub.receiver.store import Store, StoreError, StoreProblem
+from hub.receiver.verified import THREADS, Party
 from omniseer.fleet.v1 import upload_pb2 as pb
 from tests.support.s3_server import S3Server
 from tests.support.uploading import FLEET, ROBOT, Robot, content, new_signer
