@@ -12,7 +12,8 @@ from console.client.clock import Clock, Offset
 from console.client.drive_session import DriveOptions, DriveSession
 from console.client.errors import DeadlineExceeded, Unreachable, Unsupported
 from console.client.event_feed import EventFeed
-from console.client.exporting import Export, ExportedRecording, ExportOptions, file_bytes, once_read
+from console.client.exporting import Export, ExportedRecording, ExportOptions, once_read
+from console.client.file_stream import file_bytes
 from console.client.mapping import recording
 from console.client.mapping.driving import (
     enabled_request,

@@ -26,7 +26,7 @@ from typing import Any, Final, Protocol
 from urllib.parse import SplitResult, urlsplit
 
 from console.client.errors import GatewayFailed, NotTrusted, Overloaded, Refused, Unreachable
-from console.client.exporting import SILENT_S, PullStream, chunk_of
+from console.client.file_stream import SILENT_S, PullStream, chunk_of
 from console.client.mapping.methods import Method
 from console.client.results import ExportHeader, RecordingFile
 from fleet.servers import THIS_MACHINE
