@@ -14,7 +14,7 @@ from console.client.results import (
 )
 from console.monitor.bar_items import BarItem
 from console.monitor.monitor_state import MonitorState
-from console.monitor.recordings import Asked, Change, ExportState, ExportView, RecordingsView
+from console.monitor.recordings_view import Asked, Change, ExportState, ExportView, RecordingsView
 from console.presentation.cloud import copy_text
 from console.presentation.formatting import age, joined, plural, size, wall_clock
 from console.presentation.preview_switch import Note

@@ -1,31 +1,23 @@
-"""Recordings from a window: the list, its pictures, what an operator asks for, and one copy at a time.
+"""Recordings from a window: the list, its pictures, what an operator asks for, and exports (exports.py).
 
 Everything runs in the worker's loop. The list is requested when the recorder's state changes, and while it is
-shown every ten seconds besides. A copy has a connection of
-its own, so that neither status nor commands of a driver wait behind it.
+shown every ten seconds besides.
 
     a call is refused or fails      a note says why; the list is requested anew
     the role does not suffice       the same, and `denied` until other credentials are used
     the list can't be had           `problem` says why; what was listed stays
     a picture can't be had          the recording has none; after a lost connection it is requested again
-    a copy fails, or is cancelled   what was received stays, and another one goes on from there
 """
 
 import asyncio
-import time
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import AbstractAsyncContextManager, suppress
-from dataclasses import dataclass, field, replace
-from enum import Enum
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Final, NoReturn, Protocol
 
-from common.errors import UserError
 from console.client import (
-    ExportedRecording,
-    ExportOptions,
-    ExportProgress,
     GatewayError,
     Overloaded,
     Recording,
@@ -39,10 +31,10 @@ from console.client.results import (
     RecordingThumbnail,
 )
 from console.monitor.calls import Calls
-from console.monitor.export_meter import ExportMeter, ExportRate
+from console.monitor.exports import ExportingClient, Exports
 from console.monitor.notes import Notes
+from console.monitor.recordings_view import Asked, Change, ExportView, RecordingsView
 from console.presentation.preview_switch import Note
-from console.presentation.recording import exported
 from console.presentation.severity_style import SeverityStyle
 
 MOST_LISTED: Final = 200
@@ -52,15 +44,12 @@ _LIST_EVERY_S: Final = 10.0
 _LEAST_BETWEEN_LISTS_S: Final = 1.0
 _LEAST_BETWEEN_PICTURES_S: Final = 0.1
 _PICTURES_AGAIN_S: Final = 5.0
-_MOST_EXPORTS: Final = 20
-"""Whose ends are remembered."""
-_EXPORT_ENDS_WITHIN_S: Final = 0.5
 _UNLISTABLE: Final = (RecorderState.UNKNOWN, RecorderState.UNREACHABLE)
 _ROLE_TOO_LOW: Final = "ROLE_TOO_LOW"
 """docs/errors.md"""
 
 
-class RecordingClient(Protocol):
+class RecordingClient(ExportingClient, Protocol):
     """The calls of `console.client.AsyncGatewayClient` that are made here."""
 
     async def list_recordings(self, page_size: int = ..., page_token: str = ...) -> RecordingPage:
@@ -84,11 +73,6 @@ class RecordingClient(Protocol):
     async def delete_recording(self, recording_id: str, *, expected_sha256: bytes = ...) -> RecordingDeleted:
         """Deletes a recording."""
 
-    async def export_recording(
-        self, recording_id: str, folder: Path, options: ExportOptions | None = ...
-    ) -> ExportedRecording:
-        """Copies a recording to this computer."""
-
 
 class RecordingRobot(Protocol):
     """The client in use; another one after each change of the credentials."""
@@ -107,90 +91,14 @@ class Pictures(Protocol):
         """Returns the pixels; empty where none can be made. Raises a `GatewayError` of `fetch`."""
 
 
-class Change(Enum):
-    """What an operator asks for."""
-
-    START = "start"
-    STOP = "stop"
-    KEEP = "keep"
-    PIN = "pin"
-    DELETE = "delete"
-
-
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """A change, and the recording that it is for; empty for the one that runs."""
-
-    change: Change
-    recording_id: str = ""
-
-
-class ExportState(Enum):
-    """State of a copy."""
-
-    RUNNING = "running"
-    DONE = "done"
-    FAILED = "failed"
-    CANCELLED = "cancelled"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ExportView:
-    """A copy at one moment.
-
-    Args:
-        folder: on this computer.
-        state: its state.
-        done, total: bytes; `total` is 0 before the first.
-        rate: of the newest seconds.
-        text: why nothing comes, what is there, or why it failed; may be empty.
-    """
-
-    folder: Path
-    state: ExportState = ExportState.RUNNING
-    done: int = 0
-    total: int = 0
-    rate: ExportRate = field(default_factory=ExportRate)
-    text: str = ""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RecordingsView:
-    """What is known of the recordings at one moment.
-
-    Args:
-        listed: the newest ones, the newest first; None before the first list.
-        more: whether there are others.
-        problem: why the list can't be had; empty while it can.
-        pending: what the robot has yet to answer.
-        denied: why this caller may change nothing; empty as long as nothing was refused for that.
-        exports: copies by the recording's ID, the newest last.
-        pictures: pixels by the recording's ID; empty ones where there are none.
-    """
-
-    listed: tuple[Recording, ...] | None = None
-    more: bool = False
-    problem: str = ""
-    pending: frozenset[Asked] = frozenset()
-    denied: str = ""
-    exports: Mapping[str, ExportView] = field(default_factory=dict)
-    pictures: Mapping[str, bytes] = field(default_factory=dict)
-
-    @property
-    def exporting(self) -> str:
-        """The ID of the recording that is being copied; empty without one."""
-        running = (name for name, each in self.exports.items() if each.state is ExportState.RUNNING)
-        return next(running, "")
-
-
 class Recordings:
-    """Lists, changes and copies recordings. Thread-safe; nothing here waits.
+    """Lists, changes and exports recordings. Thread-safe; nothing here waits.
 
     Args:
         call_soon: calls a function in the loop that runs `run`.
         on_change: called in that loop after each change of what `view` and `take_notes` return; must only
             hand over.
-        connect: opens another connection to the robot, for a copy.
+        connect: opens another connection to the robot, for an export.
         pictures: makes pictures of key frames; None for none.
     """
 
@@ -205,18 +113,17 @@ class Recordings:
     ) -> None:
         self._call_soon = call_soon
         self._on_change = on_change
-        self._connect = connect
         self._pictures = pictures
         self._view = RecordingsView()
         self._notes = Notes(on_change)
         self._calls = Calls(on_change)
+        self._exports = Exports(connect, self._notes, self._update_exports)
         self._followed: object = None
         """What of the recorder's status says that its recordings have changed."""
         self._again_s: float | None = None
         """Time until the next list without a change; None for none."""
         self._listable, self._changed, self._visible = asyncio.Event(), asyncio.Event(), asyncio.Event()
         self._to_picture: tuple[Recording, ...] = ()
-        self._export: asyncio.Task[None] | None = None
         self._denied_to: RecordingClient | None = None
 
     # --- any thread ---
@@ -273,17 +180,17 @@ class Recordings:
         )
 
     def export(self, recording_id: str, folder: Path) -> None:
-        """Copies a recording, going on with what is there; no-op while another copy runs."""
-        self._call_soon(partial(self._begin_export, recording_id, folder))
+        """Exports a recording, going on with what is there; no-op while another export runs."""
+        self._call_soon(partial(self._exports.begin, recording_id, folder))
 
     def cancel_export(self) -> None:
-        """Ends the copy that runs; what was received stays."""
-        self._call_soon(self._cancel_export)
+        """Ends the export that runs; what was received stays."""
+        self._call_soon(self._exports.cancel)
 
     # --- the loop ---
 
     async def run(self, robot: RecordingRobot) -> NoReturn:
-        """Serves until cancelled: then calls and a copy are cancelled. Raises only a defect of our own."""
+        """Serves until cancelled: then calls and an export are cancelled. Raises only a defect of our own."""
         self._robot = robot
         try:
             async with asyncio.TaskGroup() as tasks:
@@ -291,9 +198,7 @@ class Recordings:
                 tasks.create_task(self._keep_pictured())
         finally:
             self._calls.cancel()
-            if self._export:
-                self._export.cancel()
-                await asyncio.wait((self._export,), timeout=_EXPORT_ENDS_WITHIN_S)
+            await self._exports.end()
         raise AssertionError("both go on for ever")
 
     def _follow(self, listable: bool, shown: bool) -> None:
@@ -381,47 +286,8 @@ class Recordings:
             self._update(pending=self._view.pending - {asked})
             self._changed.set()
 
-    def _begin_export(self, recording_id: str, folder: Path) -> None:
-        if self._export is None or self._export.done():
-            self._export = asyncio.create_task(self._copy(recording_id, folder))
-
-    def _cancel_export(self) -> None:
-        if self._export:
-            self._export.cancel()
-
-    async def _copy(self, recording_id: str, folder: Path) -> None:
-        meter = ExportMeter()
-
-        def progress(now: ExportProgress) -> None:
-            now_s = time.monotonic()
-            if meter.is_due(now_s) or now.waiting:
-                rate = meter.read(now_s, now.done, now.total)
-                self._show_export(recording_id, done=now.done, total=now.total, rate=rate, text=now.waiting)
-
-        others = [(name, each) for name, each in self._view.exports.items() if name != recording_id]
-        begun = (recording_id, ExportView(folder=folder))
-        self._update(exports=dict([*others[1 - _MOST_EXPORTS :], begun]))
-        try:
-            async with self._connect() as robot:
-                done = await robot.client.export_recording(
-                    recording_id, folder, ExportOptions(progress=progress)
-                )
-        except UserError as error:
-            self._show_export(recording_id, state=ExportState.FAILED, text=str(error))
-            self._notes.add(f"Not copied: {error}", SeverityStyle.BAD)
-        except asyncio.CancelledError:
-            self._show_export(recording_id, state=ExportState.CANCELLED, text="")
-            raise
-        else:
-            text = exported(done)
-            self._show_export(
-                recording_id, state=ExportState.DONE, done=done.size, total=done.size, text=text
-            )
-            self._notes.add(text, SeverityStyle.GOOD)
-
-    def _show_export(self, recording_id: str, **changes: object) -> None:
-        changed = replace(self._view.exports[recording_id], **changes)  # type: ignore[arg-type]
-        self._update(exports={**self._view.exports, recording_id: changed})
+    def _update_exports(self, exports: Mapping[str, ExportView]) -> None:
+        self._update(exports=exports)
 
     def _update(self, **changes: object) -> None:
         view = replace(self._view, **changes)  # type: ignore[arg-type]

@@ -17,7 +17,7 @@ from console.monitor.recorder_controls import (
     deletion_question,
     recorder_controls,
 )
-from console.monitor.recordings import ExportState
+from console.monitor.recordings_view import ExportState
 from console.monitor.worker import Worker
 from console.presentation.preview_switch import Note
 from console.presentation.severity_style import SeverityStyle

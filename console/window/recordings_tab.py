@@ -23,7 +23,7 @@ from console.monitor.recorder_controls import (
     RecorderControls,
     RecordingItem,
 )
-from console.monitor.recordings import ExportState
+from console.monitor.recordings_view import ExportState
 from console.window.cell import SmallLabel
 from console.window.labels import WrappedLabel, plain_tip, scale_font, set_text, set_tool_tip
 from console.window.layout import fill

@@ -25,7 +25,7 @@ from console.monitor.recorder_controls import (
     deletion_question,
     recorder_controls,
 )
-from console.monitor.recordings import Asked, Change, ExportState, ExportView, RecordingsView
+from console.monitor.recordings_view import Asked, Change, ExportState, ExportView, RecordingsView
 from console.presentation.severity_style import SeverityStyle
 from tests.support.played_recordings import DRIVING, ENDED, IDLE, RECORDS
 from tests.support.snapshots import NOW_S, heard, snapshot

@@ -12,7 +12,8 @@ from console.client import ExportedRecording, ExportOptions, ExportProgress, Gat
 from console.client.errors import GatewayFailed, NotAllowed, Overloaded, Refused, Unreachable
 from console.client.results import RecorderState, RecordingThumbnail
 from console.monitor import recordings as module
-from console.monitor.recordings import Asked, Change, ExportState, Recordings
+from console.monitor.recordings import Recordings
+from console.monitor.recordings_view import Asked, Change, ExportState
 from console.presentation.severity_style import SeverityStyle
 from tests.support.eventually import eventually
 from tests.support.played_recordings import ENDED, IDLE, RECORDS, PlayedRecordings
@@ -298,7 +299,7 @@ async def test_a_closed_window_cancels_its_copy() -> None:
 
 
 async def test_so_many_ends_of_copies_are_remembered(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_MOST_EXPORTS", 2)
+    monkeypatch.setattr("console.monitor.exports._MOST_EXPORTS", 2)
 
     async def export(_folder: Path, _options: ExportOptions) -> ExportedRecording:
         raise GatewayError("no")
