@@ -12,9 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from recorder.mcap.records import note_of_gap
 from recorder.store.folder import ID, MANIFEST, SEGMENT, replace_file, segment_number
+from recorder.store.gaps import bounded, distinct
 from recorder.values import VIDEO_TOPIC, ChannelSummary, Gap, GapCause, Losses, SegmentSummary
 
-MAX_GAPS: Final = 1000
 _NS_PER_MS: Final = 1_000_000
 _MAX_BYTES: Final = 1024 * 1024 * 1024
 """Of a manifest; a segment takes some hundred bytes of it. A longer one counts as damaged."""
@@ -194,9 +194,8 @@ class Manifest(_Part):
     @property
     def all_gaps(self) -> tuple[Gap, ...]:
         """Its gaps in order, at most 1000; further ones are merged with the last."""
-        found = list(self._gaps)
-        found.sort(key=lambda gap: (gap.began_ns, gap.ended_ns))
-        return tuple(bounded(found))
+        in_order = sorted(self._gaps, key=lambda gap: (gap.began_ns, gap.ended_ns))
+        return tuple(bounded(in_order))
 
     @property
     def losses(self) -> Losses:
@@ -209,29 +208,8 @@ class Manifest(_Part):
 
     @property
     def _gaps(self) -> Iterator[Gap]:
-        """Yields each gap once: an interruption is in the segment that follows it, too, which may be older.
-
-        A segment of the ring may have one that began before what a snapshot is to contain.
-        """
-        yield from self.gaps
-        known = [each for each in self.gaps if _stops_all_channels(each)]
-        for gap in (each for segment in self.segments for each in segment.gaps):
-            if not _stops_all_channels(gap):
-                yield gap
-                continue
-            part = self._since_window(gap)
-            if part and not any(_are_one(part, each) for each in known):
-                yield part
-
-    def _since_window(self, gap: Gap) -> Gap | None:
-        """Returns what of a gap does not lie before what a snapshot is to contain; None if all of it does.
-
-        The window's end cuts nothing: where the clock was set forward, files within it have later times.
-        """
-        if self.window_ns is None:
-            return gap
-        from_ns, _ = self.window_ns
-        return replace(gap, began_ns=max(gap.began_ns, from_ns)) if gap.ended_ns > from_ns else None
+        from_ns = self.window_ns[0] if self.window_ns else None
+        return distinct(self.gaps, (gap for segment in self.segments for gap in segment.gaps), from_ns)
 
     @property
     def sha256(self) -> bytes:
@@ -347,21 +325,6 @@ class Manifest(_Part):
         replace_file(folder / MANIFEST, self.model_dump_json(indent=1, exclude_defaults=True).encode())
 
 
-def _stops_all_channels(gap: Gap) -> bool:
-    """Returns whether a gap is of all channels, and of unknown size: as what an interruption has cost."""
-    causes = (GapCause.INTERRUPTED, GapCause.DISK)
-    return gap.cause in causes and not gap.topic and gap.messages is None
-
-
-def _are_one(gap: Gap, other: Gap) -> bool:
-    """Returns whether two interruptions are the same: of two that follow each other, one instant is shared.
-
-    The cause alone says little: the ring's own numbers do not have it, a file has.
-    """
-    shared_ns = min(gap.ended_ns, other.ended_ns) - max(gap.began_ns, other.began_ns)
-    return shared_ns > 0 or (shared_ns == 0 and gap.cause is other.cause)
-
-
 class DamagedManifestError(Exception):
     """A manifest that can't be read; the text says why."""
 
@@ -390,21 +353,3 @@ def read_manifest(folder: Path) -> Manifest:
 def file_of(name: str, content: bytes) -> File:
     """Returns what is known of a file with this content."""
     return File(name=name, size=len(content), sha256=hashlib.sha256(content).hexdigest())
-
-
-def bounded(gaps: list[Gap]) -> list[Gap]:
-    """Returns at most 1000 gaps; the last one stands for all further ones."""
-    if len(gaps) <= MAX_GAPS:
-        return gaps
-    kept, rest = gaps[: MAX_GAPS - 1], gaps[MAX_GAPS - 1 :]
-    counts = [gap.messages for gap in rest]
-    return [
-        *kept,
-        Gap(
-            topic="",
-            cause=rest[0].cause,
-            began_ns=min(gap.began_ns for gap in rest),
-            ended_ns=max(gap.ended_ns for gap in rest),
-            messages=None if None in counts else sum(count or 0 for count in counts),
-        ),
-    ]

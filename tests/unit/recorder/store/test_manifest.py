@@ -6,15 +6,8 @@ from pathlib import Path
 import pytest
 
 from recorder.store.folder import segment_name
-from recorder.store.manifest import (
-    MAX_GAPS,
-    DamagedManifestError,
-    Kind,
-    Manifest,
-    RecordingState,
-    bounded,
-    read_manifest,
-)
+from recorder.store.gaps import MAX_GAPS, bounded
+from recorder.store.manifest import DamagedManifestError, Kind, Manifest, RecordingState, read_manifest
 from recorder.values import VIDEO_TOPIC, ChannelSummary, Gap, GapCause, Losses, SegmentSummary
 
 ID = "20260101T000000Z-abcdef"
