@@ -5,9 +5,11 @@ from dataclasses import dataclass
 from recorder.config import RecorderSettings
 from recorder.lifecycle_runner import LifecycleRunner
 from recorder.manual_recorder import ManualRecorder
+from recorder.outages import Outages
 from recorder.outputs import Outputs, Sources
 from recorder.reports import Reports
 from recorder.ring_recorder import RingRecorder
+from recorder.snapshots import Snapshots
 from recorder.store.catalogue import Catalogue
 from recorder.store.housekeeping import Housekeeping
 from recorder.store.ring import Ring
@@ -78,16 +80,18 @@ def build(
     )
     ring: RingRecorder | None = None
     if segments:
-        ring = RingRecorder(
+        outages = Outages()
+        snapshots = Snapshots(
             settings,
             segments,
             catalogue,
             outputs,
-            writer,
+            outages,
             housekeeping=housekeeping,
             boot_id=boot_id,
             run_id=run_id,
         )
+        ring = RingRecorder(settings, segments, outputs, writer, outages=outages, snapshots=snapshots)
     return Parts(
         settings=settings,
         boot_id=boot_id,

@@ -130,7 +130,7 @@ class Operations:
             raise NotFoundError("no recording runs", Reason.RECORDING_NOT_FOUND)
         manifest = self._status_reader.get(recording_id) if recording_id else running
         assert manifest is not None, "one of both"  # noqa: S101  # for the type checker
-        snapshots = self._ring.due(manifest.id) if self._ring else []
+        snapshots = self._ring.snapshots.due(manifest.id) if self._ring else []
         message = f"{manifest.id} had ended already"
         if running and running.id == manifest.id:
             await self._recorder.end(StopReason.REQUESTED)
@@ -160,7 +160,7 @@ class Operations:
             )
         await self._recorder.take_reports()
         configured = self._settings.snapshot
-        made = await self._ring.snapshot(
+        made = await self._ring.snapshots.make(
             Kind.SNAPSHOT,
             configured.pre_s if options.pre_s is None else options.pre_s,
             configured.post_s if options.post_s is None else options.post_s,
@@ -234,7 +234,7 @@ class Operations:
         if self._ring is None:
             return ""
         await self._recorder.take_reports()
-        made = await self._ring.report_fault(fault_id, severity, message)
+        made = await self._ring.snapshots.report_fault(fault_id, severity, message)
         self._parts.reports.wake.set()
         return made
 

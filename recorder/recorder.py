@@ -106,7 +106,7 @@ class Recorder:
             await self._ring.rotate()
             await self.take_reports()
             for each in recording_ids:
-                await self._ring.finish(each, reason)
+                await self._ring.snapshots.finish(each, reason)
 
     # --- from the start to the end ---
 
@@ -179,7 +179,7 @@ class Recorder:
     async def _rest(self, ends: "asyncio.Task[Literal[True]]") -> None:
         """Returns when there is something to do."""
         wake = self._parts.reports.wake
-        due_s = self._ring.next_due_s if self._ring else None
+        due_s = self._ring.snapshots.next_due_s if self._ring else None
         pause_s = _TICK_S if due_s is None else max(0.0, min(_TICK_S, due_s))
         woken = asyncio.ensure_future(wake.wait())
         await asyncio.wait({ends, woken}, timeout=pause_s, return_when=asyncio.FIRST_COMPLETED)
@@ -200,7 +200,7 @@ class Recorder:
         if self._manual.at_its_limit:
             await self.end(StopReason.LIMIT)
         if self._ring:
-            await self.finish_snapshots(self._ring.due())
+            await self.finish_snapshots(self._ring.snapshots.due())
             await self._ring.drop_outdated()
         self._outputs.measure(now_s)
         if now_s >= self._room_at_s:
@@ -222,7 +222,7 @@ class Recorder:
         self.ending = True
         await self.take_reports()
         if self._ring:
-            await self.finish_snapshots(self._ring.due(all_of_them=True), StopReason.SHUTDOWN)
+            await self.finish_snapshots(self._ring.snapshots.due(all_of_them=True), StopReason.SHUTDOWN)
         if self._lifecycle.state is State.RECORDING:
             await self.end(StopReason.SHUTDOWN)
         if self._ring:
@@ -306,7 +306,7 @@ class Recorder:
             await self.end(StopReason.DISK)
             self._lifecycle.stopped_for_room()
         elif self._ring:
-            await self.finish_snapshots(self._ring.due(all_of_them=True), StopReason.DISK)
+            await self.finish_snapshots(self._ring.snapshots.due(all_of_them=True), StopReason.DISK)
 
     async def _open_ring(self) -> None:
         faulted = self._lifecycle.state in (State.FAULTED, State.RECOVERING)

@@ -138,7 +138,7 @@ class StatusReader:
     @property
     def snapshots_pending(self) -> int:
         """Snapshots that are being made."""
-        return self._parts.ring.pending if self._parts.ring else 0
+        return self._parts.ring.snapshots.pending if self._parts.ring else 0
 
     @property
     def ring_s(self) -> int:

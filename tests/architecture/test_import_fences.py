@@ -141,9 +141,13 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
                 "recorder",
                 "reports",
                 "ring_recorder",
+                "snapshots",
             )
         ),
-        ("recorder/manual_recorder.py", ("recorder.assembly", "recorder.recorder", "recorder.ring_recorder")),
+        *(
+            (f"recorder/{name}.py", ("recorder.assembly", "recorder.recorder", "recorder.ring_recorder"))
+            for name in ("manual_recorder", "snapshots")
+        ),
         ("recorder/status_reader.py", ("recorder.recorder", "recorder.operations")),
         ("gateway/status/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config", "asyncio")),
         ("gateway/access/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config")),

@@ -8,7 +8,7 @@ from typing import Final
 
 import pytest
 
-from recorder import ring_recorder
+from recorder import ring_recorder, snapshots
 from recorder.requests import SnapshotOptions
 from recorder.store.manifest import Kind, Manifest, RecordingState
 from tests.support.recorder_in_process import Running, Source, numbers, running_recorder
@@ -65,7 +65,8 @@ class Ground:
 @pytest.fixture
 async def ground(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Ground]:
     clock = SetForward()
-    monkeypatch.setattr(ring_recorder, "time", clock)
+    for each in (ring_recorder, snapshots):
+        monkeypatch.setattr(each, "time", clock)
     incidents = {"pre_s": PRE_S, "post_s": POST_S, "cooldown_s": 600}
     ring = {"preset": "all", "seconds": 600}
     async with running_recorder(tmp_path, ring=ring, incidents=incidents) as running:
