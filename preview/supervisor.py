@@ -78,8 +78,8 @@ from preview.lifecycle import (
 from preview.listener_retry import ListenerRetry
 from preview.pipeline.events import Blame, Fault, PipelineEvents
 from preview.pipeline.plan import Plan, make_plan
-from preview.pipeline.sources import SourcePlan
 from preview.ports import Pipeline, PlanCamera, Recording
+from preview.preparation import Preparation
 from preview.teardowns import Teardowns
 from preview.values import (
     CAPTURE_OFFSET_NS,
@@ -120,7 +120,6 @@ class Supervisor:
         self._encoders = encoders
         self._marker = marker
         self._new_pipeline = new_pipeline
-        self._plan_camera = plan_camera
         self.changes = Broadcast()
         """Notified of each change of the actual state."""
         self._instance_id = uuid.uuid4().hex
@@ -139,10 +138,7 @@ class Supervisor:
         self._unwatched_timer = Timer(self._disable_unwatched)
         self._recording: Recording | None = None
         self._listener_retry = ListenerRetry(self._wake.set)
-        self._trials: asyncio.Task[bool] | None = None
-        self._look: asyncio.Task[SourcePlan] | None = None
-        """Plans the camera that the next pipeline starts with."""
-        self._looked_at = ""
+        self._preparation = Preparation(encoders, plan_camera)
         self._closed = False
 
     # --- for the gateway ---
@@ -350,31 +346,8 @@ class Supervisor:
         """The passphrase that the listener is to have at present; None: there is to be none."""
         return None if self._listener_retry.waits else self._desired.session
 
-    async def _find_encoder(self) -> bool:
-        """Runs trials until an encoder works that has not failed; False when none does, or when disabled."""
-        self._trials = asyncio.create_task(self._encoders.probe(), name="trials until one succeeds")
-        try:
-            await asyncio.wait({self._trials})
-            return not self._trials.cancelled() and self._trials.result()
-        finally:
-            self._trials.cancel()
-
-    async def _look_at(self, camera: str) -> SourcePlan | None:
-        """Plans a camera; None when that was given up, because it is not to be started any more.
-
-        Raises:
-            UserError: it can't be used.
-        """
-        self._looked_at = camera
-        self._look = asyncio.create_task(self._plan_camera(camera), name=f"plan of camera {camera}")
-        try:
-            await asyncio.wait({self._look})
-            return None if self._look.cancelled() else self._look.result()
-        finally:
-            self._look.cancel()
-
     async def _start(self) -> None:
-        await self._find_encoder()
+        await self._preparation.find_encoder()
         if not self._is_starting():
             return
         try:
@@ -384,7 +357,7 @@ class Supervisor:
             return
         camera = self._cameras.first
         try:
-            source = await self._look_at(camera)
+            source = await self._preparation.plan(camera)
             if source is None or not self._is_starting():
                 return
             plan = make_plan(self._settings, self._desired, encoder, choice, source)
@@ -421,7 +394,7 @@ class Supervisor:
             await self._tear_down(self._pipeline, wait_s=ENCODER_STOP_S)
         if self._encoder_failed:
             self._encoder_failed = False
-            if await self._find_encoder():
+            if await self._preparation.find_encoder():
                 self._lifecycle.count(fallbacks=1)
                 self._retry_now = True
             if self._lifecycle.state is not State.FAULTED:
@@ -543,8 +516,8 @@ class Supervisor:
             self._move(Event.DISABLE)
         elif new_request:
             self._cameras.follow(new_request=True)
-            if self._look and self._cameras.first != self._looked_at:
-                self._look.cancel()  # The start begins anew, with the other camera.
+            # The start begins anew, with the other camera.
+            self._preparation.give_up_other_than(self._cameras.first)
         self._wake.set()
         self.changes.notify_all()
 
@@ -573,9 +546,7 @@ class Supervisor:
         elif before is not State.RUNNING and self._pipeline:
             self._cameras.attach(self._pipeline)
         if event is Event.DISABLE:
-            for awaited in (self._trials, self._look):
-                if awaited:
-                    awaited.cancel()
+            self._preparation.give_up()
         if after is not before:
             _log.info("%s -> %s (%s)", before.value, after.value, event.value)
         self._wake.set()
