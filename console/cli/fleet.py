@@ -20,7 +20,7 @@ from console.cli.fleet_tables import answer_line, fleet_view, recordings_table, 
 from console.cli.fleet_watch import fleet_json, watch
 from console.cli.login import STANDARD_INPUT, login_text
 from console.cli.options import JsonOption, json_requested
-from console.cli.record import exported_json
+from console.cli.recording_tables import exported_json
 from console.cli.session import Session, print_json, standard_output
 from console.cli.transfer_bar import TransferBar
 from console.client.export_path import path_below

@@ -4,32 +4,24 @@ import asyncio
 import shlex
 import sys
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import typer
-from rich.console import Group, RenderableType
-from rich.table import Table
+from rich.console import Group
 from rich.text import Text
 
 from common.errors import ExitCode, UserError
 from console.cli.export_options import naming_export_options
+from console.cli.recording_tables import exported_json, exported_text, recording_view, recordings_table
 from console.cli.session import Session, print_json, with_session
-from console.cli.tables import grid
 from console.cli.transfer_bar import TransferBar
 from console.cli.typed_options import typed_options
-from console.client import ExportOptions, GatewayClient, Recording, RecordingCopyState
+from console.client import ExportOptions, GatewayClient, RecordingCopyState
 from console.client.export_path import path_below
-from console.client.exporting import ExportedRecording
 from console.client.results import RecordingCopy
-from console.presentation.cloud import copy_text
-from console.presentation.formatting import age, joined, plural, size, wall_clock
 from console.presentation.json_form import json_form
 from console.presentation.recording import (
-    exported,
-    is_written,
-    recording_state,
     recording_summary,
-    remarks,
 )
 
 _LEAST_LIMIT_MBIT: Final = 0.53
@@ -152,7 +144,7 @@ def list_all(session: Session) -> None:
     status, recordings = pages[0].status, tuple(each for page in pages for each in page.recordings)
     document = {"status": json_form(status), "recordings": json_form(recordings)}
     summary = Text(f"{status.state.value.upper()}  {recording_summary(status, compact=False)}", style="dim")
-    session.show(document, Group(_list_table(recordings), Text(), summary) if recordings else summary)
+    session.show(document, Group(recordings_table(recordings), Text(), summary) if recordings else summary)
 
 
 @record_app.command("show")
@@ -161,7 +153,7 @@ def show(session: Session, *, recording_id: IdArgument) -> None:
     """Show a recording with its files and its gaps."""
     with session.connect() as gateway:
         found = gateway.recording(recording_id)
-    session.show(json_form(found), _view(found))
+    session.show(json_form(found), recording_view(found))
 
 
 @record_app.command("pin")
@@ -308,92 +300,10 @@ async def _export(session: Session, recording_id: str, to: Path, *, resume: bool
     if session.as_json:
         print_json(session.out, {"ok": True, **exported_json(done)})
     else:
-        session.out.print(_exported(done, found))
-
-
-def exported_json(done: ExportedRecording) -> dict[str, Any]:
-    """Returns the JSON form of what was copied."""
-    return {
-        "folder": str(done.folder),
-        "files": done.files,
-        "size": done.size,
-        "received": done.received,
-        "cuts": done.cuts,
-        "not_final": list(done.not_final),
-    }
-
-
-def _exported(done: ExportedRecording, recording: Recording) -> str:
-    text = exported(done)
-    if done.not_final or is_written(recording):
-        rest = plural(len(done.not_final), "file")
-        text += f"\nThe recording goes on: {rest} not final yet. Later, type the same with --resume"
-    return text
+        session.out.print(exported_text(done, found))
 
 
 def _pin(session: Session, recording_id: str, *, pinned: bool) -> None:
     with session.connect() as gateway:
         answer = gateway.pin_recording(recording_id, pinned)
     session.show_answer(answer)
-
-
-def _list_table(recordings: tuple[Recording, ...]) -> Table:
-    table = grid("nowrap", "nowrap", "nowrap", "right", "right", "nowrap", "fold", "fold")
-    table.add_row("id", "began", "state", "length", "size", "copy", "label", "", style="dim")
-    for each in recordings:
-        table.add_row(
-            Text(each.id),
-            Text(wall_clock(each.started_unix_ms)),
-            Text(recording_state(each)),
-            age(each.duration_ms),
-            size(each.size),
-            Text(copy_text(each.copy, each.size)),
-            Text(each.label or each.preset),
-            Text(remarks(each), style="dim"),
-        )
-    return table
-
-
-def _view(recording: Recording) -> RenderableType:
-    facts = grid("nowrap", "fold")
-    ended = wall_clock(recording.ended_unix_ms) if recording.ended_unix_ms else "still written"
-    for label, text in (
-        ("label", recording.label),
-        ("notes", recording.notes),
-        ("state", recording_state(recording)),
-        ("preset", recording.preset),
-        ("began", wall_clock(recording.started_unix_ms)),
-        ("ended", ended),
-        ("length", age(recording.duration_ms)),
-        ("size", size(recording.size)),
-        ("messages", f"{recording.messages_written}, {_losses(recording)}"),
-        ("video", plural(recording.video_frames, "frame") if recording.video_frames else "none"),
-        ("", remarks(recording)),
-        ("copy", joined(copy_text(recording.copy, recording.size), recording.copy.reason)),
-    ):
-        if text:
-            facts.add_row(Text(label, style="dim"), Text(text))
-    files = grid("fold", "right", "nowrap")
-    for file in recording.files:
-        files.add_row(Text(file.name), size(file.size), Text("" if file.final else "still written"))
-    gaps = grid("nowrap", "nowrap", "fold")
-    for gap in recording.gaps:
-        began = wall_clock(gap.began_unix_ms, form="%Y-%m-%d %H:%M:%S")
-        when = f"{began} to {wall_clock(gap.ended_unix_ms, form='%H:%M:%S %Z')}"
-        gaps.add_row(
-            Text("gap", style="bold yellow"), Text(when), f"{gap.cause.value}, {_lost(gap.messages)}"
-        )
-    return Group(Text(recording.id, style="bold"), Text(), facts, Text(), files, gaps)
-
-
-def _losses(recording: Recording) -> str:
-    """Returns what is missing in all; where gaps could not be counted, never that nothing is."""
-    uncounted = recording.uncounted_gaps
-    gaps = plural(uncounted, "gap") + " of unknown size" if uncounted else ""
-    if gaps and recording.messages_lost == 0:
-        return gaps
-    return joined(_lost(recording.messages_lost), gaps)
-
-
-def _lost(messages: int | None) -> str:
-    return "losses unknown" if messages is None else f"{messages} lost"

@@ -12,7 +12,7 @@ from console.cli.fleet import recordings_json
 from console.cli.fleet_events import item_json
 from console.cli.fleet_watch import fleet_json
 from console.cli.info import info_json
-from console.cli.record import exported_json
+from console.cli.recording_tables import exported_json
 from console.client import Unreachable
 from console.client.exporting import ExportedRecording
 from console.client.mapping.driving import drive_item

@@ -8,7 +8,7 @@ from io import StringIO
 import pytest
 from rich.console import Console, RenderableType
 
-from console.cli import events, record
+from console.cli import events, recording_tables
 from console.cli.fleet_tables import item_line, recordings_table
 from console.client.results import Event, Recording
 from console.fleet.values import RobotEvent, StoredRecording
@@ -41,8 +41,8 @@ def printed(shown: RenderableType) -> str:
 
 
 def test_times_of_recordings_have_their_zone() -> None:
-    assert f"2026-11-22 08:00:00 {ZONE}" in printed(record._list_table((RECORDING,)))
-    lines = printed(record._view(RECORDING)).splitlines()
+    assert f"2026-11-22 08:00:00 {ZONE}" in printed(recording_tables.recordings_table((RECORDING,)))
+    lines = printed(recording_tables.recording_view(RECORDING)).splitlines()
     times = [line for line in lines if line.split()[:1] in (["began"], ["ended"], ["gap"])]
     assert len(times) == 3
     assert all(ZONE in line for line in times)
