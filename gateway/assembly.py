@@ -105,6 +105,15 @@ class SnapshotSubscriber(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
+class Preview:
+    """What watches the preview service, requests its state, and passes on what viewers report."""
+
+    link: PreviewLink
+    control: PreviewControl
+    feedback: Feedback
+
+
+@dataclass(frozen=True, slots=True)
 class Recording:
     """What watches the recorder, passes calls on, and reports incidents."""
 
@@ -172,11 +181,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     """
     # Milliseconds since the computer's start: a later gateway's revisions exceed an earlier one's.
     first_revision = time.clock_gettime_ns(time.CLOCK_BOOTTIME) // 1_000_000
-    model = PreviewModel(settings.encrypts_preview, partial(secrets.token_urlsafe, _PASSPHRASE_BYTES))
-    name = f"preview service at {settings.preview.socket}"
-    feedback = Feedback(outside.preview_connector())
-    link = ServiceLink(name, feedback, Reconciler(first_revision, model))
-    control = PreviewControl(link, settings.preview.settle_ms / 1000)
+    preview = _preview(settings, outside, first_revision)
     stats = Stats([name for service in SERVICES for name in service.methods_by_name])
     events = Events()
     addresses = 2 if settings.grpc.socket else 1
@@ -184,15 +189,15 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     admission = Admission(settings.limits, max_connections=max_connections)
     refusals = RefusalDelay()
     connection_guard = ConnectionGuard(admission)
-    access = AccessControl(settings.security, events, control, admission, refusals)
+    access = AccessControl(settings.security, events, preview.control, admission, refusals)
     recipients = Recipients(settings.preview.advertised_host)
-    teleop = _teleop(settings, link, access.audit, first_revision)
+    teleop = _teleop(settings, preview.link, access.audit, first_revision)
     recording = _recording(settings)
     cloud = _cloud(settings, recording, access.audit)
     state = State(
         settings,
         events=events,
-        preview=link,
+        preview=preview.link,
         access=access,
         calls=stats,
         teleop=teleop,
@@ -204,7 +209,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     event_stream = EventStream(events.log, events.added)
     services = Services(
         status=StatusService(ResponseCache(state, time.monotonic), status_stream, recipients),
-        preview=PreviewService(control, feedback, state, recipients),
+        preview=PreviewService(preview.control, preview.feedback, state, recipients),
         events=EventsService(event_stream),
         info=InfoService(state, stats, shown_settings(settings)),
         teleop=TeleopService(teleop, state, legacy_clients=settings.teleop.legacy_clients),
@@ -235,7 +240,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
         events=events,
         state=state,
         subscribers=tuple(each for each in subscribers if each),
-        preview_link=link,
+        preview_link=preview.link,
         teleop=teleop,
         recording=recording,
         cloud=cloud,
@@ -253,12 +258,21 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
             connection_guard=connection_guard,
             status_stream=status_stream,
             event_stream=event_stream,
-            preview_link=link,
+            preview_link=preview.link,
             drive_link=teleop.link if teleop else None,
             recorder=RecorderMetrics(recording.link, recording.incidents, exports) if recording else None,
             bridge=BridgeMetrics(cloud.link, cloud.copies, cloud.hub_requests) if cloud else None,
         ),
     )
+
+
+def _preview(settings: GatewaySettings, outside: Outside, first_revision: int) -> Preview:
+    """Returns what speaks to the preview service."""
+    model = PreviewModel(settings.encrypts_preview, partial(secrets.token_urlsafe, _PASSPHRASE_BYTES))
+    feedback = Feedback(outside.preview_connector())
+    name = f"preview service at {settings.preview.socket}"
+    link = ServiceLink(name, feedback, Reconciler(first_revision, model))
+    return Preview(link, PreviewControl(link, settings.preview.settle_ms / 1000), feedback)
 
 
 def _teleop(
