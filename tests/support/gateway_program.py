@@ -3,9 +3,9 @@
 import json
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +15,32 @@ from bench.video.foreign import end
 from omniseer.gateway.v1.robot_gateway_pb2 import GetOverlaySnapshotRequest, GetSystemStatusRequest
 from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
 from tests.support.free import free_tcp_port
+from tests.support.restartable_program import RestartableProgram
 
 _ROOT = Path(__file__).parents[2]
 _UP_WITHIN_S = 20.0
+_MAIN = "from gateway.cli import main; main()"
+
+
+@dataclass
+class RestartableGateway(RestartableProgram):
+    """A gateway that is at the same address after each start; `settings` are those besides it."""
+
+    name = "gateway"
+    end_within_s = 20
+
+    directory: Path
+    settings: Mapping[str, Any]
+    port: int = field(default_factory=free_tcp_port)
+    process: subprocess.Popen[bytes] | None = None
+
+    @property
+    def target(self) -> str:
+        return f"127.0.0.1:{self.port}"
+
+    def start(self) -> None:
+        """Starts it; it need not answer when this returns."""
+        self.spawn((sys.executable, "-c", _MAIN), {"grpc": {"port": self.port}, **self.settings})
 
 
 @dataclass
@@ -35,7 +58,7 @@ class GatewayProgram:
         return self.stub.GetOverlaySnapshot(GetOverlaySnapshotRequest(), timeout=5)
 
     def source(self, name: str) -> Any:
-        """What the status tells of one source."""
+        """What the status says of one source."""
         return next(each for each in self.status().sources if each.name == name)
 
 
@@ -55,8 +78,7 @@ def gateway_program(
     config = directory / "gateway.yaml"
     values = {"grpc": {"port": port}, "preview": {"socket": str(directory / "preview.sock")}, **settings}
     config.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
-    program = f"{first}; from gateway.cli import main; main()"
-    command = [sys.executable, "-c", program, "serve", "--config", str(config)]
+    command = [sys.executable, "-c", f"{first}; {_MAIN}", "serve", "--config", str(config)]
     with (directory / "gateway.log").open("wb") as log:
         process = subprocess.Popen(command, cwd=_ROOT, stderr=log)
     try:

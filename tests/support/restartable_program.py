@@ -3,6 +3,7 @@
 import json
 import os
 import subprocess
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Final
@@ -63,6 +64,8 @@ class RestartableProgram:
                 [*command, "serve", "--config", str(config)],
                 cwd=_ROOT,
                 env=os.environ | dict(environment or {}),
+                stdin=subprocess.DEVNULL,
+                stdout=log,
                 stderr=log,
             )
 
@@ -92,6 +95,22 @@ class RestartableProgram:
         except subprocess.TimeoutExpired:
             self.kill()
             raise
+
+    def end(self, *, failed: bool) -> None:
+        """The same; after a failure its log is on standard error."""
+        try:
+            self.stop()
+        finally:
+            if failed:
+                sys.stderr.write(self.log.read_text(encoding="utf-8"))
+
+    def descriptors(self) -> int:
+        """Returns how many file descriptors it has."""
+        return len(list(Path(f"/proc/{self.pid}/fd").iterdir()))
+
+    def threads(self) -> int:
+        """Returns how many threads it has."""
+        return len(list(Path(f"/proc/{self.pid}/task").iterdir()))
 
     def assert_alive(self) -> None:
         """Fails, with the end of its log, if it has ended."""

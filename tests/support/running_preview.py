@@ -1,7 +1,6 @@
 """A preview service for a test: the real program, called over its real socket."""
 
 import json
-import os
 import socket
 import subprocess
 import sys
@@ -13,11 +12,11 @@ from types import TracebackType
 from typing import Any, Protocol, Self
 
 import grpc
-import yaml
 
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from omniseer.preview.v1 import preview_service_pb2_grpc as pb_grpc
 from tests.support.free import free_udp_port
+from tests.support.restartable_program import RestartableProgram
 from tests.support.waiting import wait_until
 
 ROOT = Path(__file__).parents[2]
@@ -42,7 +41,7 @@ class NextState(Protocol):
     def __call__(self, holds: Callable[[pb.ActualState], object], what: str) -> pb.ActualState: ...
 
 
-class RunningPreview:
+class RunningPreview(RestartableProgram):
     """The service as a process.
 
     Args:
@@ -54,6 +53,10 @@ class RunningPreview:
         small: whether frames are smaller than those of the service's own profiles.
     """
 
+    name = "preview"
+    end_within_s = PATIENCE_S
+    process: subprocess.Popen[bytes]
+
     def __init__(
         self,
         directory: Path,
@@ -63,11 +66,9 @@ class RunningPreview:
         cameras: Mapping[str, Any] | None = None,
         small: bool = True,
     ) -> None:
+        self.directory = directory
         self.port = free_udp_port()
-        self.socket = directory / "preview.sock"
         self.runtime_dir = directory / "run"
-        self.log = directory / "preview.log"
-        self._config = directory / "preview.yaml"
         self._doubles = dict(doubles or {})
         self._cameras = dict(cameras or {})
         self.revision = 0
@@ -81,10 +82,8 @@ class RunningPreview:
             "encoders": {"order": ["x264"]},
             "timeouts": PATIENT,
         }
-        self._config.write_text(
-            yaml.safe_dump(_merged(own, settings or {}), sort_keys=False), encoding="utf-8"
-        )
-        self.process = self._spawn()
+        self._settings = _merged(own, settings or {})
+        self._start()
         self._connect()
 
     def _connect(self) -> None:
@@ -98,7 +97,7 @@ class RunningPreview:
         wait_until(
             lambda: _listens(self.socket) or self.process.poll() is not None, "the service is up", PATIENCE_S
         )
-        assert self.process.poll() is None, self.log.read_text(encoding="utf-8")
+        self.assert_alive()
 
     def __enter__(self) -> Self:
         self._wait_until_up()
@@ -108,24 +107,7 @@ class RunningPreview:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.channel.close()
-        self.process.terminate()
-        try:
-            self.process.wait(PATIENCE_S)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
-            raise
-        finally:
-            if kind is not None:
-                sys.stderr.write(self.log.read_text(encoding="utf-8"))
-
-    def descriptors(self) -> int:
-        """How many file descriptors it has."""
-        return len(list(Path(f"/proc/{self.process.pid}/fd").iterdir()))
-
-    def threads(self) -> int:
-        """How many threads it has."""
-        return len(list(Path(f"/proc/{self.process.pid}/task").iterdir()))
+        self.end(failed=kind is not None)
 
     def resident_mib(self) -> float:
         """Its memory that is in RAM."""
@@ -135,7 +117,7 @@ class RunningPreview:
     def start_again(self) -> None:
         """Restarts the process after its end, as a container engine does, and connects anew."""
         assert self.process.poll() is not None
-        self.process = self._spawn()
+        self._start()
         self._wait_until_up()
         # gRPC's own backoff, 1 s and more, is no part of the gateway's link (gateway.links.grpc_client).
         self.channel.close()
@@ -214,21 +196,15 @@ class RunningPreview:
             lambda a: a.state == pb.LIFECYCLE_STATE_FAULTED and words in a.last_error, f"faulted: {words}"
         )
 
-    def _spawn(self) -> subprocess.Popen[bytes]:
-        environment = dict(os.environ)
+    def _start(self) -> None:
+        environment = {}
         if self._doubles or self._cameras:
-            environment["PYTHONPATH"] = f"{DOUBLES_DIR}:{ROOT}"
-            environment["ENCODER_DOUBLES"] = json.dumps(self._doubles)
-            environment["CAMERA_DOUBLES"] = json.dumps(self._cameras)
-        with self.log.open("ab") as log:
-            return subprocess.Popen(
-                [sys.executable, "-m", "preview.cli", "serve", "--config", str(self._config)],
-                cwd=ROOT,
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=log,
-            )
+            environment = {
+                "PYTHONPATH": f"{DOUBLES_DIR}:{ROOT}",
+                "ENCODER_DOUBLES": json.dumps(self._doubles),
+                "CAMERA_DOUBLES": json.dumps(self._cameras),
+            }
+        self.spawn((sys.executable, "-m", "preview.cli"), self._settings, environment)
 
 
 def _merged(base: dict[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:

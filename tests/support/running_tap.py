@@ -1,7 +1,6 @@
 """A camera tap for a test: the real program, in the ROS domain of the environment."""
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -10,17 +9,15 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-import yaml
-
 from common.errors import UserError
 from tap.client import observed_state
+from tests.support.restartable_program import RestartableProgram
 from tests.support.waiting import wait_until
 
-ROOT = Path(__file__).parents[2]
 PATIENCE_S = 20.0
 
 
-class RunningTap:
+class RunningTap(RestartableProgram):
     """The program as a process.
 
     Args:
@@ -28,12 +25,14 @@ class RunningTap:
         settings: keys of its configuration besides the socket.
     """
 
+    name = "tap"
+    end_within_s = PATIENCE_S
+    process: subprocess.Popen[bytes]
+
     def __init__(self, directory: Path, **settings: Any) -> None:
-        self.socket = directory / "tap.sock"
-        self.log = directory / "tap.log"
-        self._config = directory / "tap.yaml"
-        self._config.write_text(yaml.safe_dump({"socket": str(self.socket), **settings}), encoding="utf-8")
-        self.process = self._spawn()
+        self.directory = directory
+        self._settings = {"socket": str(self.socket), **settings}
+        self._start()
 
     def __enter__(self) -> Self:
         self.serves()
@@ -43,21 +42,12 @@ class RunningTap:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.process.send_signal(signal.SIGCONT)
-        self.process.terminate()
-        try:
-            self.process.wait(PATIENCE_S)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
-            raise
-        finally:
-            if kind is not None:
-                sys.stderr.write(self.log.read_text(encoding="utf-8"))
+        self.end(failed=kind is not None)
 
     def serves(self) -> None:
         """Waits until it serves."""
         wait_until(lambda: self._answers() or self.process.poll() is not None, "the tap serves", PATIENCE_S)
-        assert self.process.poll() is None, self.log.read_text(encoding="utf-8")
+        self.assert_alive()
 
     def state(self) -> dict[str, Any]:
         """Its state."""
@@ -72,23 +62,10 @@ class RunningTap:
 
         return wait_until(held, f"{what}; last: {json.dumps(self.state())}", PATIENCE_S)
 
-    def descriptors(self) -> int:
-        """How many file descriptors it has."""
-        return len(list(Path(f"/proc/{self.process.pid}/fd").iterdir()))
-
-    def threads(self) -> int:
-        """How many threads it has."""
-        return len(list(Path(f"/proc/{self.process.pid}/task").iterdir()))
-
-    def kill(self) -> None:
-        """Kills it, so that it can't say anything any more."""
-        self.process.kill()
-        self.process.wait()
-
     def start_again(self) -> None:
         """Starts it after its end, as a supervisor does."""
         assert self.process.poll() is not None
-        self.process = self._spawn()
+        self._start()
         self.serves()
 
     def _answers(self) -> bool:
@@ -98,13 +75,5 @@ class RunningTap:
             return False
         return True
 
-    def _spawn(self) -> subprocess.Popen[bytes]:
-        with self.log.open("ab") as log:
-            return subprocess.Popen(
-                [sys.executable, "-m", "tap.cli", "serve", "--config", str(self._config)],
-                cwd=ROOT,
-                env=dict(os.environ),
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=log,
-            )
+    def _start(self) -> None:
+        self.spawn((sys.executable, "-m", "tap.cli"), self._settings)

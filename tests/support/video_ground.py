@@ -1,22 +1,18 @@
 """A robot that has nothing but video: the real preview service behind the real gateway, each a process."""
 
-import json
 import socket
-import subprocess
-import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from console.client import DeadlineExceeded, GatewayClient, PreviewProfile, PreviewState, Unreachable
-from tests.support.free import free_tcp_port
+from tests.support.gateway_program import RestartableGateway
 from tests.support.patient import PATIENT
 from tests.support.running_preview import RunningPreview
 from tests.support.waiting import wait_until
 
-_ROOT = Path(__file__).parents[2]
 _UP_WITHIN_S = 20.0
 
 
@@ -26,42 +22,21 @@ class VideoGround:
 
     Args:
         preview: makes the video.
-        directory: for the gateway's configuration and log.
-        settings: of the gateway, besides the test's own.
+        gateway: what viewers ask for it.
     """
 
     preview: RunningPreview
-    directory: Path
-    settings: Mapping[str, Any]
-    port: int = field(default_factory=free_tcp_port)
-    gateway: "subprocess.Popen[bytes] | None" = None
+    gateway: RestartableGateway
 
     @property
     def target(self) -> str:
         """The gateway's address."""
-        return f"127.0.0.1:{self.port}"
+        return self.gateway.target
 
     def start_gateway(self) -> None:
-        """Up when this returns; at the same address every time."""
-        values = {
-            "grpc": {"port": self.port},
-            "sources": [],
-            **self.settings,
-            "preview": {"socket": str(self.preview.socket), **self.settings.get("preview", {})},
-        }
-        config = self.directory / "gateway.yaml"
-        config.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
-        program = [sys.executable, "-c", "from gateway.cli import main; main()"]
-        command = [*program, "serve", "--config", str(config)]
-        with (self.directory / "gateway.log").open("ab") as log:
-            self.gateway = subprocess.Popen(command, cwd=_ROOT, stderr=log)
+        """Up when this returns."""
+        self.gateway.start()
         wait_until(self._knows_the_preview, "the gateway is up", _UP_WITHIN_S)
-
-    def kill_gateway(self) -> None:
-        """As if somebody had pulled the plug."""
-        if self.gateway:
-            self.gateway.kill()
-            self.gateway.wait()
 
     def switch_on(self, profile: PreviewProfile = PreviewProfile.BALANCED) -> None:
         """Frames leave when this returns."""
@@ -81,7 +56,7 @@ class VideoGround:
     def _knows_the_preview(self) -> bool:
         # It may be up and not answer yet: its machine may stand still.
         with socket.socket() as probe, suppress(ConnectionRefusedError, Unreachable, DeadlineExceeded):
-            probe.connect(("127.0.0.1", self.port))
+            probe.connect(("127.0.0.1", self.gateway.port))
             with GatewayClient(self.target) as client:
                 return client.status().preview.service_reachable
         return False
@@ -120,9 +95,11 @@ def video_ground(
         small: frames of 320x240 instead of 1280x720.
     """
     with RunningPreview(directory, preview, small=small) as service:
-        ground = VideoGround(service, directory, gateway or {})
+        settings = {"sources": [], **(gateway or {})}
+        settings["preview"] = {"socket": str(service.socket), **settings.get("preview", {})}
+        ground = VideoGround(service, RestartableGateway(directory, settings))
         try:
             ground.start_gateway()
             yield ground
         finally:
-            ground.kill_gateway()
+            ground.gateway.kill()

@@ -125,7 +125,7 @@ def a_camera_fails(robot: GatewayClient) -> None:
 def test_the_choice_outlives_the_gateway_and_the_preview(ground: VideoGround) -> None:
     with GatewayClient(ground.target, PATIENT) as robot:
         robot.enable_preview(camera="rear")
-    ground.kill_gateway()
+    ground.gateway.kill()
     ground.start_gateway()
     with GatewayClient(ground.target, PATIENT) as robot:
         wait_until(lambda: robot.status().preview.wanted_camera == "rear", "the gateway has taken it over")

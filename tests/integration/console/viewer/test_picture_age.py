@@ -204,7 +204,7 @@ def test_a_picture_is_torn_for_a_round_trip_and_a_key_frame(
     way, sent = Impairment(delay_s=RTT_MS / 2000), SentStream()
     with (
         filmed(tmp_path, stamping) as ground,
-        Relay(ground.port, way.delay_s) as gateway,
+        Relay(ground.gateway.port, way.delay_s) as gateway,
         UdpLink(ground.preview.port, way, tap=sent.take) as link,
         showing(ground, f"127.0.0.1:{gateway.port}", port=link.port) as robot,
     ):

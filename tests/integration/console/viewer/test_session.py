@@ -120,7 +120,7 @@ def test_a_preview_that_stands_still_is_a_freeze_and_goes_on(
 def test_frames_go_on_without_the_gateway(ground: VideoGround, session: VideoSession) -> None:
     ground.switch_on()
     becomes(session, PlaybackState.LIVE)
-    ground.kill_gateway()
+    ground.gateway.kill()
     wait_until(lambda: session.playback().reason, "the gateway is missed")
     becomes(session, PlaybackState.LIVE)
     ground.kill_preview()
