@@ -85,11 +85,6 @@ def ask(request: pytest.FixtureRequest) -> Ask:
 
 
 @pytest.fixture
-def double() -> GatewayDouble:
-    return GatewayDouble()
-
-
-@pytest.fixture
 def port(double: GatewayDouble) -> Iterator[int]:
     with serving(double) as port:
         yield port

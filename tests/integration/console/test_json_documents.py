@@ -2,7 +2,6 @@
 
 import json
 import subprocess
-from collections.abc import Iterator
 from typing import Any
 
 import grpc
@@ -10,20 +9,9 @@ import pytest
 
 from tests.support.filled import fill
 from tests.support.free import free_tcp_port
-from tests.support.gateway_double import GatewayDouble, serving
+from tests.support.gateway_double import GatewayDouble
 from tests.support.robotctl import ROBOTCTL, environment, only_line, robotctl
 from tests.support.robotctl_docs import documented, holds
-
-
-@pytest.fixture
-def double() -> GatewayDouble:
-    return GatewayDouble()
-
-
-@pytest.fixture
-def target(double: GatewayDouble) -> Iterator[str]:
-    with serving(double) as port:
-        yield f"127.0.0.1:{port}"
 
 
 @pytest.fixture(params=["everything", "nothing"])

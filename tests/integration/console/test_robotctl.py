@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import grpc
@@ -14,7 +13,7 @@ import pytest
 from omniseer.gateway.v1 import preview_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.bad_links import black_hole
-from tests.support.gateway_double import GatewayDouble, serving
+from tests.support.gateway_double import GatewayDouble
 from tests.support.robotctl import (
     ENDS_WITHIN_S,
     ROBOTCTL,
@@ -27,17 +26,6 @@ from tests.support.robotctl import (
 KNOWN_WITHIN_S = 3.0
 START_OF_PYTHON_S = 3.0
 """On a machine that does other things as well; unloaded it is 0.3 s."""
-
-
-@pytest.fixture
-def double() -> GatewayDouble:
-    return GatewayDouble()
-
-
-@pytest.fixture
-def target(double: GatewayDouble) -> Iterator[str]:
-    with serving(double) as port:
-        yield f"127.0.0.1:{port}"
 
 
 def test_status_for_people(target: str) -> None:

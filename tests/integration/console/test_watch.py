@@ -22,11 +22,6 @@ SHOW_CURSOR, HIDE_CURSOR = "\x1b[?25h", "\x1b[?25l"
 COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 
 
-@pytest.fixture
-def double() -> GatewayDouble:
-    return GatewayDouble()
-
-
 class Lines:
     """robotctl in a pipe; its lines as they come."""
 

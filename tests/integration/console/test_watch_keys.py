@@ -24,17 +24,6 @@ SHOW_CURSOR, HIDE_CURSOR = "\x1b[?25h", "\x1b[?25l"
 
 
 @pytest.fixture
-def double() -> GatewayDouble:
-    return GatewayDouble()
-
-
-@pytest.fixture
-def target(double: GatewayDouble) -> Iterator[str]:
-    with serving(double) as port:
-        yield f"127.0.0.1:{port}"
-
-
-@pytest.fixture
 def screen(target: str) -> Iterator[Terminal]:
     with robotctl_on_terminal("watch", "--interval", "0.1", "--target", target) as screen:
         screen.wait_to_see("q quit")
