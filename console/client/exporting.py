@@ -316,10 +316,8 @@ async def once_read(
 
 def _is_being_read(recording: Recording) -> bool:
     """Whether files of a run bundle that has ended still have no sums."""
-    bundle, ended = (
-        recording.kind is RecordingKind.RUN_BUNDLE,
-        recording.state is not RecordingState.RECORDING,
-    )
+    bundle = recording.kind is RecordingKind.RUN_BUNDLE
+    ended = recording.state is not RecordingState.RECORDING
     return bundle and ended and not all(file.final for file in recording.files)
 
 

@@ -54,10 +54,8 @@ async def upload_progress(robot: Robot, recording_id: str) -> AsyncGenerator[Upl
     Raises:
         GatewayError: The recording is deleted, or the robot refuses; not for an outage.
     """
-    newest, unseen = (
-        UploadProgress(RecordingCopy(state=RecordingCopyState.UNKNOWN, reason="", bytes_done=0)),
-        0,
-    )
+    newest = UploadProgress(RecordingCopy(state=RecordingCopyState.UNKNOWN, reason="", bytes_done=0))
+    unseen = 0
     async with aclosing(robot.watch_status(_EVERY_S)) as statuses:
         async for item in statuses:
             if isinstance(item, Outage):

@@ -93,11 +93,8 @@ class MonitorWindow(QWidget):
         self.header = TopBar(worker.target, roster or Roster())
         self.picture = PictureArea(video)
         self.banner, self.toasts = self.picture.banner, self.picture.toasts
-        self.strip, self.plots, self.side = (
-            BottomStrip(),
-            Plots(QBoxLayout.Direction.LeftToRight),
-            SidePanel(),
-        )
+        self.strip, self.side = BottomStrip(), SidePanel()
+        self.plots = Plots(QBoxLayout.Direction.LeftToRight)
         self.driving = Driving(self, worker, self.strip, self.picture, pad)
         self.recording = RecordingActions(worker, self.side.recordings, self.picture)
         self.band = band

@@ -102,10 +102,8 @@ def service_endpoint(service: Service, path: Path) -> Finding:
         if not path.parent.is_dir():
             remedy = f"Create the directory {path.parent}, or share it with the container of {service.name}"
     except ConnectionRefusedError:
-        what, remedy = (
-            f"{path} is left over from a program that ended",
-            f"Start {service.name} again: {start_command(service.program)}",
-        )
+        what = f"{path} is left over from a program that ended"
+        remedy = f"Start {service.name} again: {start_command(service.program)}"
     except PermissionError:
         what, remedy = f"this user may not use {path}", _permission_remedy(path)
     except OSError as error:

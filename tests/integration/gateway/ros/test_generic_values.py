@@ -147,10 +147,8 @@ MISSING = [
 def test_a_field_that_is_not_there_leaves_the_other_sources_alone(
     type_name: str, field: str, words: str
 ) -> None:
-    source, other = (
-        SourceSettings(**number("x", type_name, field)),
-        SourceSettings(**number("y", "std_msgs/msg/Bool", "data")),
-    )
+    source = SourceSettings(**number("x", type_name, field))
+    other = SourceSettings(**number("y", "std_msgs/msg/Bool", "data"))
     board = Board()
     with intake((source, other), board) as running:
         assert list(running.sources) == ["number.y"]

@@ -209,11 +209,9 @@ def test_what_an_active_fault_says_is_no_note_beside_it() -> None:
 def test_a_camera_that_has_a_fault_needs_no_note() -> None:
     def change(made: overlay_pb2.OverlaySnapshot) -> None:
         preview = made.status.preview
-        preview.state, preview.service_reachable, preview.wanted_camera = (
-            states.PREVIEW_RUNNING,
-            True,
-            "front",
-        )
+        preview.state = states.PREVIEW_RUNNING
+        preview.service_reachable = True
+        preview.wanted_camera = "front"
         preview.cameras.add(name="front", state=preview_pb2.CAMERA_STATE_FAILED, error="unplugged")
         made.status.faults.add(id="preview.camera.front", severity=2, active=True)
 

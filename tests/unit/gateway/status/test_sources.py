@@ -104,10 +104,8 @@ def test_losing_the_value_is_a_change(spec: SourceSpec[Any]) -> None:
 
 @by_name
 def test_a_value_has_a_field_in_the_contract_unless_the_source_is_named(spec: SourceSpec[Any]) -> None:
-    without, given = (
-        overlay_snapshot(snapshot(Board()), RECIPIENT),
-        overlay_snapshot(with_value(spec), RECIPIENT),
-    )
+    without = overlay_snapshot(snapshot(Board()), RECIPIENT)
+    given = overlay_snapshot(with_value(spec), RECIPIENT)
     if spec.name == "effective_command":
         assert given.status.effective_command.available, "mapped as the attributed command"
     for message in (without, given):
