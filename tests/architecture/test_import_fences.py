@@ -387,7 +387,7 @@ def home_of(file: str) -> str:
 
 
 def test_the_fence_sees_what_it_should() -> None:
-    """A fence that reads no imports would let everybody through."""
+    """A fence that reads no imports would let everything through."""
     assert offenders("common/gst.py", ("gi",))
     assert len({found.importer for found in imports()}) > 20
 

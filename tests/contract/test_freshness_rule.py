@@ -1,8 +1,8 @@
-"""A rule of the contract, read from its schema: what was measured somewhere tells how far it can be trusted.
+"""A rule of the contract, read from its schema: what was measured somewhere says how far it can be trusted.
 
 Each field that holds a value stands in a message, or below one, that has the fields `available`, `stale` and
 `age_ms` (or the three with a common prefix, `odom_stale` for example). What needs no age is listed here with
-the reason; whoever adds a field decides which of the two it is.
+the reason; an author who adds a field decides which of the two it is.
 """
 
 from collections.abc import Iterator
@@ -19,10 +19,10 @@ TRIPLES = [
 ]
 
 _ITSELF = "the gateway's own, true at the moment of the answer"
-_SERVICE = "told by the preview service on every change; service_reachable says whether it still speaks"
+_SERVICE = "reported by the preview service on every change; service_reachable says whether it still speaks"
 _RECORDER = "reported by the recorder on every change; its state says whether it still answers"
 _BRIDGE = "reported by the bridge on every change; its state says whether it still answers"
-_EVENT = "of something that happened at an instant which is told with it; it never grows old"
+_EVENT = "of something that happened at an instant which is reported with it; it never grows old"
 NEEDS_NO_AGE = {
     "SystemStatus.gateway_name": _ITSELF,
     "SystemStatus.gateway_version": _ITSELF,

@@ -1,4 +1,4 @@
-"""Every method says who may call it; what says nothing is served to nobody; the page says the same."""
+"""Every method says who may call it; what says nothing is served to no caller; the page says the same."""
 
 import re
 from pathlib import Path
@@ -23,7 +23,7 @@ PAGE = (Path(__file__).parents[2] / "docs/security.md").read_text(encoding="utf-
 
 
 def undeclared(service: str, names: list[str]) -> list[str]:
-    """Methods that nobody may call, because their schema says nothing."""
+    """Methods that no caller may use, because their schema says nothing."""
     return [name for name in names if Method(f"/{service}/{name}").needed is Open.UNDECLARED]
 
 
@@ -34,7 +34,7 @@ def test_every_method_declares_a_role() -> None:
 
 @pytest.fixture
 def forgetful(monkeypatch: pytest.MonkeyPatch) -> str:
-    """A service of somebody who forgot it; its name."""
+    """A service whose author forgot it; its name."""
     file = descriptor_pb2.FileDescriptorProto(name="forgetful.proto", package="forgetful", syntax="proto3")
     file.message_type.add(name="Empty")
     service = file.service.add(name="Forgetful")

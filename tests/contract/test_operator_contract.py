@@ -171,7 +171,7 @@ async def test_a_pipeline_that_fails_is_an_answer(ground: Ground, operator: Oper
         preview = await preview_in(operator, states.PREVIEW_FAULTED)
         assert preview.last_error
         assert preview.counters.faults >= 1
-        assert preview.last_error in answer.message, "the message tells the operator what to do"
+        assert preview.last_error in answer.message, "the message says what the operator is to do"
         assert preview.profile == LOW_BW
     # A new request is a new attempt at once.
     assert (await running(operator)).last_error == ""

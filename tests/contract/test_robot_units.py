@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 DEPLOY = ROOT / "deploy/robot"
 PROGRAMS = ("gateway", "preview", "drive", "recorder", "bridge", "tap")
 MOST_EXPOSED = 2.5
-"""Of 10, by systemd-analyze security: what may be exposed to whoever takes over a program."""
+"""Of 10, by systemd-analyze security: what may be exposed to one who takes over a program."""
 OWN_SECTION = {
     "gateway": ["SystemCallFilter=sched_setscheduler setpriority"],
     "preview": ["SystemCallFilter=setpriority"],

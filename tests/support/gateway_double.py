@@ -144,7 +144,7 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
         _not_offered(context)
 
     def preview_service_dies(self) -> None:
-        """From now on nobody makes video; what is wanted stays wanted."""
+        """From now on nothing makes video; what is desired stays so."""
         preview = self.status.preview
         preview.service_reachable = False
         if preview.state != states.PREVIEW_DISABLED:

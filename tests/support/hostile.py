@@ -36,7 +36,7 @@ def _continued(headers: bytes) -> bytes:
 
 
 def _taken_back(stream: int) -> bytes:
-    """A call, and its end before anybody could answer."""
+    """A call, and its end before it could be answered."""
     return frame(HEADERS, GET_SYSTEM_STATUS, stream=stream, flags=END_HEADERS) + frame(
         RST_STREAM, bytes(4), stream=stream
     )

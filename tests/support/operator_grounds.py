@@ -53,7 +53,7 @@ class RealGround(Ground):
 
     @contextmanager
     def nothing_starts(self) -> Iterator[None]:
-        """Somebody else has the stream's port."""
+        """Another program has the stream's port."""
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
             taken.bind(("127.0.0.1", self._preview.port))
             yield

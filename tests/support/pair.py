@@ -1,4 +1,4 @@
-"""A publisher and a subscriber of the robot's own, each a process: what they lose, somebody else has cost.
+"""A publisher and a subscriber of the robot's own, each a process: what they lose, another has cost.
 
 `python -m tests.support.pair talk` publishes numbers 200 times a second; `... listen` collects them. Both end
 when their standard input does; the talker prints how many it sent, the listener the numbers it got.

@@ -122,7 +122,7 @@ def alone(*command: str | Path, **variables: str) -> subprocess.CompletedProcess
     return subprocess.run(
         ["unshare", "--map-root-user", "--net", *command],
         cwd="/",
-        # What a machine's pip is told to look into is no part of a release.
+        # What a machine's pip is set to look into is no part of a release.
         env={**kept, "PIP_CONFIG_FILE": os.devnull, **variables},
         capture_output=True,
         text=True,

@@ -43,18 +43,18 @@ class Lookout:
 
     @property
     def slowest_s(self) -> float:
-        """The longest anybody waited for an answer."""
+        """The longest wait for an answer."""
         return max(answer.took_s for answer in list(self.answers))
 
     def wait_for(self, state: PreviewState, since_s: float, within_s: float) -> Answer:
-        """The first answer after `since_s` (wall clock) that tells this state of the preview."""
+        """The first answer after `since_s` (wall clock) with this state of the preview."""
 
         def first() -> Answer | None:
             return next(
                 (a for a in list(self.answers) if a.at_s >= since_s and a.status.preview.state is state), None
             )
 
-        return wait_until(first, f"the preview is told to be {state.value}", within_s)
+        return wait_until(first, f"the preview is reported as {state.value}", within_s)
 
     def _ask(self) -> None:
         while not self._over.wait(0.02):

@@ -145,7 +145,7 @@ def test_a_guarded_gateway_reads_credentials_that_it_can_not_change() -> None:
 
 
 def test_what_a_robot_without_credentials_accepted_ends_with_the_overlay() -> None:
-    """In whatever order somebody names the files."""
+    """In whatever order the files are named."""
     for order in (("demo", "guarded"), ("guarded",)):
         assert config(*order)["services"]["gateway"]["environment"]["GATEWAY__SECURITY__INSECURE"] == "false"
 

@@ -61,7 +61,7 @@ class Guarded:
 
     Attributes:
         refused: how the start ended before there were credentials.
-        told: what the log said then, line by line.
+        said: what the log said then, line by line.
         gateways_then: the state of the gateway's container then.
         begun: what the command printed that the line had named.
         anna: an operator's credentials.
@@ -70,7 +70,7 @@ class Guarded:
 
     deployment: Deployment
     refused: Any
-    told: tuple[str, ...]
+    said: tuple[str, ...]
     gateways_then: str
     begun: Any
     anna: Credentials
@@ -91,11 +91,11 @@ def guarded(
     overlays = (demo_overlay(), str(ROOT / "compose.guarded.yaml"))
     with deployed(tmp_path_factory.mktemp("guarded"), *overlays, up=False) as deployment:
         refused = typed(deployment, UP)
-        told = tuple(deployment.logs("gateway-config").splitlines())
+        said = tuple(deployment.logs("gateway-config").splitlines())
         gateways_then = deployment.inspect("gateway")["State"]["Status"]
         # Whatever the line says is what is typed.
-        says = re.search(r"Type: (docker compose .+)$", told[-1])
-        assert says, told
+        says = re.search(r"Type: (docker compose .+)$", said[-1])
+        assert says, said
         begun = typed(deployment, says[1])
         up = typed(deployment, UP)
         assert up.returncode == 0, up.stderr + deployment.logs("gateway-config")
@@ -103,7 +103,7 @@ def guarded(
         with deployment.client(ben) as robot:
             wait_until(lambda: knows(robot), "the gateway knows its new credentials", UP_WITHIN_S)
             deployment.wait_for_status(robot)
-        yield Guarded(deployment, refused, told, gateways_then, begun, anna, ben)
+        yield Guarded(deployment, refused, said, gateways_then, begun, anna, ben)
 
 
 STRANGER = f"""
@@ -159,8 +159,8 @@ def test_the_pages_say_what_is_typed_here(command: str) -> None:
 def test_without_credentials_the_start_ends_with_one_line_that_says_what_to_type(guarded: Guarded) -> None:
     assert guarded.refused.returncode != 0
     assert "gateway-config" in guarded.refused.stderr
-    assert len(guarded.told) == 1, guarded.told
-    assert guarded.told[0].endswith(f"Type: {INIT}")
+    assert len(guarded.said) == 1, guarded.said
+    assert guarded.said[0].endswith(f"Type: {INIT}")
     assert guarded.gateways_then == "created", "the gateway itself was never started, so nothing loops"
 
 

@@ -129,7 +129,7 @@ async def test_what_the_robot_recorded_is_on_this_computer(ground: Ground, lapto
         assert "(--resume)" in refused.stderr
         again = await laptop.got("--resume")
         assert again["received"] == 0
-        # Whoever has changed it here keeps it.
+        # What was changed here is kept.
         (laptop.folder / "empty").write_bytes(b"notes")
         changed = await laptop.get("--resume")
         assert changed.returncode == 1

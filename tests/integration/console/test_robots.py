@@ -15,7 +15,7 @@ from tests.support.robotctl_docs import documented, holds
 
 
 class Person:
-    """Somebody with a home of their own, and robots called one and two that really answer."""
+    """A person with a home of their own, and robots called one and two that really answer."""
 
     def __init__(self, home: Path, targets: dict[str, str]) -> None:
         self.book = home / "robotctl/config.toml"

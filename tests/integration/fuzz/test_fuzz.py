@@ -61,7 +61,7 @@ def test_the_receivers_store_in_memory_has_all_that_the_receiver_calls() -> None
 
 
 def test_a_defect_is_found_and_can_be_tried_again(tmp_path: Path) -> None:
-    # Requests as they would be checked by somebody who knows four profiles and expects no other.
+    # Requests as they would be checked by code that knows four profiles and expects no other.
     careless = (
         "import sys, gateway.rpc.interceptors.validation as validation\n"
         "validation.validate = lambda request: {0: 0, 1: 1, 2: 2, 3: 3}[getattr(request, 'profile', 0)]\n"

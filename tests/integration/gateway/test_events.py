@@ -111,7 +111,7 @@ async def test_the_overlays_short_list_comes_from_the_same_log(operator: Operato
     async with AsyncGatewayClient(f"127.0.0.1:{operator.port}") as client:
         events = client.events()
         await client.enable_preview()
-        # Before the two have met, the preview counts as faulted, which the list tells as a fault.
+        # Before the two have met, the preview counts as faulted, which the list shows as a fault.
         running = await until(events, EventKind.PREVIEW, "preview running")
         messages = [event.message for event in (await client.overlay()).events]
     assert running.message in messages
@@ -141,11 +141,11 @@ async def test_a_gap_is_sent_before_what_follows_it(after: EventPosition, reason
 
 
 class Ledger:
-    """Everything that one subscriber was told, checked as it comes."""
+    """Everything that one subscriber got, checked as it comes."""
 
     def __init__(self) -> None:
         self.position: EventPosition | None = None
-        self.told: list[tuple[str, int]] = []
+        self.got: list[tuple[str, int]] = []
         self.missed: dict[str, int] = {}
         self.outages = 0
 
@@ -155,7 +155,7 @@ class Ledger:
                 here, there = self.position, item.position
                 if here is not None:
                     assert there == EventPosition(here.run_id, here.sequence + 1), "in order, no silent hole"
-                self.told.append((there.run_id, there.sequence))
+                self.got.append((there.run_id, there.sequence))
                 self.position = there
             case EventGap():
                 run_id = item.position.run_id
@@ -210,11 +210,11 @@ async def test_every_subscriber_gets_every_event_or_a_gap(seed: int) -> None:
         await asyncio.gather(*followers, return_exceptions=True)
     assert any(ledger.outages for ledger in ledgers), "something broke"
     for ledger in ledgers:
-        assert len(set(ledger.told)) == len(ledger.told), "none twice"
+        assert len(set(ledger.got)) == len(ledger.got), "none twice"
         for run_id, count in server.happened.items():
-            told = sum(1 for run, _ in ledger.told if run == run_id)
+            got = sum(1 for run, _ in ledger.got if run == run_id)
             if run_id == server.newest.run_id:
-                assert told + ledger.missed.get(run_id, 0) == count, "all, or counted as missing"
+                assert got + ledger.missed.get(run_id, 0) == count, "all, or counted as missing"
 
 
 async def _follow(port: int, ledger: Ledger) -> None:

@@ -1,4 +1,4 @@
-"""Faults of a real gateway: found by itself, told to whoever asks, over when their reason is gone."""
+"""Faults of a real gateway: found by itself, shown to its callers, cleared when their reason is gone."""
 
 import logging
 from pathlib import Path
@@ -53,4 +53,4 @@ async def test_a_limit_that_the_computer_breaks_is_found_without_a_call(
             await eventually(log, lambda it: "event: warning: memory is nearly full" in it, "the event")
             status = await operator.status()
     assert by_id(status)["platform.memory"].active
-    assert status.gateway.requests_served == 0, "somebody asked before"
+    assert status.gateway.requests_served == 0, "it was asked before"

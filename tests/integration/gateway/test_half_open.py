@@ -28,7 +28,7 @@ async def next_of(events: Any, kind: EventKind) -> Event:
 @pytest.mark.timed
 @pytest.mark.timeout(90)
 async def test_a_half_open_connection_is_freed_within_ten_seconds(tmp_path: Path) -> None:
-    """The client's machine is gone: nobody closes the connection, nobody answers on it."""
+    """The client's machine is gone: nothing closes the connection, and nothing answers on it."""
     # A client without keepalive of its own: nothing but the gateway's notices.
     options = (("grpc.use_local_subchannel_pool", 1),)
     async with (

@@ -52,27 +52,27 @@ async def test_calls_of_a_real_gateway_are_counted(tmp_path: Path) -> None:
         await asyncio.gather(*(operator.status() for _ in range(5)))
         with pytest.raises(grpc.aio.AioRpcError):
             await operator.switch(enabled=True, profile=9)
-        told = await samples(port)
-        assert told["robot_gateway_requests_total", "OK", "GetSystemStatus"] == 5
-        assert told["robot_gateway_requests_total", "INVALID_ARGUMENT", "SetPreviewMode"] == 1
-        assert told["robot_gateway_preview_state", "disabled"] == 1
-        assert told["robot_gateway_uptime_seconds",] > 0
+        shown = await samples(port)
+        assert shown["robot_gateway_requests_total", "OK", "GetSystemStatus"] == 5
+        assert shown["robot_gateway_requests_total", "INVALID_ARGUMENT", "SetPreviewMode"] == 1
+        assert shown["robot_gateway_preview_state", "disabled"] == 1
+        assert shown["robot_gateway_uptime_seconds",] > 0
         again = await samples(port)
-        assert again["robot_gateway_uptime_seconds",] > told["robot_gateway_uptime_seconds",]
+        assert again["robot_gateway_uptime_seconds",] > shown["robot_gateway_uptime_seconds",]
 
 
 async def test_a_caller_who_leaves_is_counted_as_such(tmp_path: Path) -> None:
     port, preview = free_tcp_port(), tmp_path / "preview.sock"
     with socket.socket(socket.AF_UNIX) as silent:
-        # Connections to it come about, and nobody ever speaks: a wish is on its way for a while.
+        # Connections to it come about, and nothing is ever said on them: a request is on its way for a while.
         silent.bind(str(preview))
         silent.listen()
         async with running_gateway(preview, metrics={"port": port}) as operator:
             waiting = asyncio.create_task(operator.switch(enabled=True, timeout_s=None))
-            await eventually(operator.status, lambda status: status.preview.profile, "the wish is there")
+            await eventually(operator.status, lambda status: status.preview.profile, "the request is there")
             waiting.cancel()
             left = ("robot_gateway_requests_total", "CANCELLED", "SetPreviewMode")
-            await eventually(lambda: samples(port), lambda told: told.get(left) == 1, "he is counted")
+            await eventually(lambda: samples(port), lambda shown: shown.get(left) == 1, "it is counted")
 
 
 async def test_without_a_port_there_are_none(tmp_path: Path) -> None:
@@ -139,4 +139,4 @@ async def test_an_open_stream_is_counted_until_it_ends(tmp_path: Path) -> None:
         stream = ("robot_gateway_streams", "WatchSystemStatus")
         assert (await samples(port))[stream] == 1
         watching.cancel()
-        await eventually(lambda: samples(port), lambda told: stream not in told, "it is closed")
+        await eventually(lambda: samples(port), lambda shown: stream not in shown, "it is closed")

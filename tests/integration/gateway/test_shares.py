@@ -118,7 +118,7 @@ async def test_connections_beyond_the_bound_are_refused_until_one_is_free(tmp_pa
 
 async def test_a_long_request_is_refused_with_a_reason(tmp_path: Path) -> None:
     async with running_gateway(tmp_path / "p.sock", limits={"request_bytes": 2000}) as operator:
-        # An unknown field of a later contract: as long as it is short, nobody minds.
+        # An unknown field of a later contract: as long as it is short, it does no harm.
         assert await raw_unary(operator.channel, STATUS)(b"\xfa\x01\xe8\x07" + bytes(1000))
         with pytest.raises(grpc.aio.AioRpcError) as seen:
             await raw_unary(operator.channel, STATUS)(b"\xfa\x01\xb8\x17" + bytes(3000))

@@ -111,7 +111,7 @@ async def test_a_component_in_trouble_is_a_fault_until_it_says_it_is_well(
     async with saying(talker, {"/diagnostics": stale}):
         status = await eventually(operator.status, lambda it: "diagnostics.lidar" in faults(it), "lidar")
     motor, lidar = faults(status)["diagnostics.drive_motor_left"], faults(status)["diagnostics.lidar"]
-    assert (motor.active, motor.severity) == (True, FAULT_SEVERITY_ERROR), "nobody said that it is well"
+    assert (motor.active, motor.severity) == (True, FAULT_SEVERITY_ERROR), "nothing said that it is well"
     assert motor.message == "drive motor_left: overcurrent"
     assert lidar.severity == FAULT_SEVERITY_WARNING
     async with saying(talker, {"/diagnostics": report("/drive/motor_left", DiagnosticStatus.OK, "fine")}):

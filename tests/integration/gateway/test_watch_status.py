@@ -107,7 +107,7 @@ async def test_who_does_not_read_is_not_written_for(operator: Operator) -> None:
             enabled = not enabled
             await operator.switch(enabled)
             await asyncio.sleep(0.05)
-        # The window of a stream is 64 KiB: some dozens of statuses, however long nobody reads.
+        # The window of a stream is 64 KiB: some dozens of statuses, however long they are not read.
         held_up = 0
         while (time.monotonic_ns() - (await take(call)).monotonic_ns) / 1e9 > 0.5:
             held_up += 1

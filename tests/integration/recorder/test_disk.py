@@ -758,11 +758,11 @@ async def test_the_room_that_is_reported_includes_what_older_recordings_make(sma
         await running.operations.start("1", StartOptions())
         source = Source(running.queue)
 
-        def told() -> float:
+        def shown() -> float:
             source.send(size=1000)
             return running.status_reader.room_s or 0.0
 
-        await running.until(told)
+        await running.until(shown)
         told_bytes = (running.status_reader.room_s or 0.0) * running.status_reader.bytes_per_s
         assert one.size + 4 * MIB < told_bytes < one.size + 6 * MIB
         await running.operations.stop("2", "")

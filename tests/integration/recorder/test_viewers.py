@@ -21,7 +21,7 @@ from tests.support.served_recorder import Served, exported, served
 LARGE = 50 * 1024**3
 """Sparse: it takes no room, and minutes to read."""
 PROMPT_S = 3.0
-"""A stop that waits for nobody takes some 0.1 s."""
+"""A stop that waits for no viewer takes some 0.1 s."""
 VIEWERS = 24
 PATIENCE_S = 20.0
 """With a busy machine: the gateway waits for 5 s, for what takes the recorder ANSWER_WITHIN_S."""

@@ -24,7 +24,7 @@ def snapshot(board: Board, preview: PreviewView = OFF, now_s: float = 100.0) -> 
 
 
 def sentences(news: list[Event]) -> list[str]:
-    """What the overlay's short list tells."""
+    """What the overlay's short list shows."""
     return [each.sentence for each in news if each.sentence is not None]
 
 
@@ -162,8 +162,8 @@ def test_an_unreachable_service_is_an_event_and_worse_while_it_is_desired() -> N
     message = "the preview service does not answer: video is not available"
 
     def news(preview: PreviewView) -> list[str]:
-        told = sentences(observer.observe(snapshot(Board(), preview)))
-        return [each for each in told if "preview service" in each]
+        said = sentences(observer.observe(snapshot(Board(), preview)))
+        return [each for each in said if "preview service" in each]
 
     assert news(gone) == [f"warning: {message}"]
     assert news(replace(gone, state=PreviewState.FAULTED)) == [f"error now: {message}"]

@@ -214,7 +214,7 @@ def test_a_hidden_window_reports_no_age(
         hidden_by(view)
         until(lambda: not reporting(), "no report counts any more")
         shows(view, PlaybackState.LIVE)
-        assert view.robot.meter.capture_ns() is None, "nobody drives by it"
+        assert view.robot.meter.capture_ns() is None, "no one drives by it"
         assert view.robot.meter.summary(), "pictures that were seen"
         view.showNormal()
         until(reporting, "a report of the picture that is shown again")

@@ -38,7 +38,7 @@ def test_a_peer_whose_name_is_no_text_ends_nothing(tmp_path: Path) -> None:
             wait_until(lambda: "can't be examined" in log.read_text(encoding="utf-8"), "the bad name")
             served = gateway.status().gateway.uptime_ms
             wait_until(lambda: gateway.status().gateway.uptime_ms > served + 3000, "three seconds more", 20)
-            # A publisher that got no processor for a second is stale for a moment, whoever its peers are.
+            # A publisher that got no processor for a second is stale for a moment, whatever its peers are.
             wait_until(lambda: gateway.status().health.ready, "it is ready")
             wait_until(lambda: gateway.source("odometry").age_ms < 500, "odometry goes on")
             wait_until(lambda: gateway.source("vision").age_ms < 2000, "vision goes on")

@@ -1,4 +1,4 @@
-"""Nobody harms the others: not a flood the gateway, not the gateway's end the robot."""
+"""None harms the others: not a flood the gateway, not the gateway's end the robot."""
 
 import json
 import signal

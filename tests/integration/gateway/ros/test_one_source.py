@@ -31,7 +31,7 @@ YEAR_NS = 365 * 24 * 3600 * 10**9
 
 @contextmanager
 def met(talker: Talker, name: str, message_type: Any) -> Iterator[tuple[Source, Board, Any]]:
-    """A reliable source nobody samples, its board, and a publisher that has met it."""
+    """A reliable source that nothing samples, its board, and a publisher that has met it."""
     settings = next(each for each in DEFAULT_SOURCES if each.name == name)
     settings = settings.model_copy(update={"reliability": "reliable"})
     board = Board()

@@ -1,4 +1,4 @@
-"""Why a source does not come: nobody offers it, or somebody does in a way that can't reach us."""
+"""Why a source does not come: nothing offers it, or in a way that can't reach us."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

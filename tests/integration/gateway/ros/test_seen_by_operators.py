@@ -1,4 +1,4 @@
-"""The whole gateway as a process beside a robot's processes: what operators are told is what is."""
+"""The whole gateway as a process beside a robot's processes: what operators see is what is."""
 
 import signal
 import struct
@@ -263,7 +263,7 @@ def test_a_mismatch_is_reported_in_words_without_ros_names(talker: Talker, tmp_p
         )
         assert not [name for name in TOPICS.values() if name in str(gateway.overlay())]
         log = (tmp_path / "gateway.log").read_text(encoding="utf-8")
-        assert TOPICS["odometry"] in log, "whoever looks after the robot is told the topic"
+        assert TOPICS["odometry"] in log, "the topic is named for those who look after the robot"
 
 
 @pytest.mark.usefixtures("ros_domain")

@@ -1,4 +1,4 @@
-"""The audit log: whole lines, bounded files, and a disk that fails or hangs holds nobody up."""
+"""The audit log: whole lines, bounded files, and a disk that fails or hangs delays no call."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Diagnostics come in pieces: each message tells of some components, the newest word of each counts."""
+"""Diagnostics come in pieces: each message is about some components, and the newest of each counts."""
 
 from hypothesis import given
 from hypothesis import strategies as st

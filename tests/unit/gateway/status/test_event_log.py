@@ -1,4 +1,4 @@
-"""The ring of events: whatever a subscriber goes through, it gets each event once, or is told of a gap."""
+"""The ring of events: whatever a subscriber goes through, it gets each event once, or a gap."""
 
 import pytest
 from hypothesis import given
@@ -79,7 +79,7 @@ def test_the_overlay_has_the_newest_few_with_a_count_of_its_own() -> None:
     log = EventLog("run")
     for number in range(1, ON_OVERLAY + 4):
         log.add(news("left out"), 0.0)
-        log.add(news("told", f"sentence {number}"), float(number))
+        log.add(news("read", f"sentence {number}"), float(number))
     assert [event.sequence for event in log.newest()] == list(range(4, ON_OVERLAY + 4))
     assert log.newest()[-1].message == f"sentence {ON_OVERLAY + 3}"
     assert log.sequence == 2 * (ON_OVERLAY + 3)
@@ -96,7 +96,7 @@ def test_actions_outlast_the_ring_and_refusals_do_not(result: ControlResult, kep
     subscriber = Subscriber()
     while subscriber.position != Position("run", 15):
         subscriber.read(log, 100, None)
-    assert [sequence for _, sequence in subscriber.told] == [*kept, 12, 13, 14, 15]
+    assert [sequence for _, sequence in subscriber.got] == [*kept, 12, 13, 14, 15]
     holes = [(gap.missed, gap.position.sequence) for gap in subscriber.gaps]
     assert holes == ([(1, 4), (6, 11)] if kept else [])
 
@@ -133,11 +133,11 @@ def test_the_older_actions_are_bounded() -> None:
 
 
 class Subscriber:
-    """Keeps what it is told, as a client would, and can prove that nothing is missing in silence."""
+    """Keeps what it gets, as a client would, and can prove that nothing is missing in silence."""
 
     def __init__(self) -> None:
         self.position: Position | None = None
-        self.told: list[tuple[str, int]] = []
+        self.got: list[tuple[str, int]] = []
         self.gaps: list[Gap] = []
 
     def read(self, log: EventLog, at_most: int, lost_after: int | None) -> None:
@@ -153,7 +153,7 @@ class Subscriber:
             if here is not None:
                 assert (here.run_id, here.sequence + 1) == (log.run_id, event.sequence), "in order, no hole"
             self.position = Position(log.run_id, event.sequence)
-            self.told.append((log.run_id, event.sequence))
+            self.got.append((log.run_id, event.sequence))
 
 
 STEPS = st.lists(
@@ -191,9 +191,9 @@ def test_each_event_comes_once_and_in_order_or_a_gap_accounts_for_it(
                 subscriber.read(log, 20, count)
     while (log := runs[-1]).sequence and subscriber.position != Position(log.run_id, log.sequence):
         subscriber.read(log, 20, None)
-    assert len(set(subscriber.told)) == len(subscriber.told), "none twice"
+    assert len(set(subscriber.got)) == len(subscriber.got), "none twice"
     last = runs[-1]
-    of_last = [sequence for run_id, sequence in subscriber.told if run_id == last.run_id]
+    of_last = [sequence for run_id, sequence in subscriber.got if run_id == last.run_id]
     missed = sum(gap.missed for gap in subscriber.gaps if gap.position.run_id == last.run_id)
     if last.sequence:
-        assert len(of_last) + missed == last.sequence, "all of the newest run are told or counted as missing"
+        assert len(of_last) + missed == last.sequence, "all of the newest run, or counted as missing"

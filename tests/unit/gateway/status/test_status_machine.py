@@ -65,7 +65,7 @@ class Life(RuleBasedStateMachine):
 
     @rule(spec=SPECS, waits=st.floats(0, PASS_S), jump_s=st.sampled_from([0, 0, 0, 0.02, -3600, 3600, 1e9]))
     def a_message_arrives_and_is_fetched(self, spec: SourceSpec[Any], waits: float, jump_s: float) -> None:
-        """It waits for the next pass of the sampler; in between somebody may set the system clock."""
+        """It waits for the next pass of the sampler; in between the system clock may be set."""
         self.one_message(spec, waits, jump_s)
 
     @rule(spec=SPECS, count=st.integers(2, 20))
@@ -107,9 +107,9 @@ class Life(RuleBasedStateMachine):
     def look(self) -> Snapshot:
         now = self.snapshot()
         for news in self.observer.observe(now):
-            told = news.sentence or ""
-            self.raised += told.startswith(("error: ", "warning: "))
-            self.cleared += told.startswith("cleared: ")
+            said = news.sentence or ""
+            self.raised += said.startswith(("error: ", "warning: "))
+            self.cleared += said.startswith("cleared: ")
         return now
 
     def snapshot(self) -> Snapshot:

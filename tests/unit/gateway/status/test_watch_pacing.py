@@ -43,4 +43,4 @@ def test_never_too_often_and_every_change_is_sent(asked_ms: int, steps: list[tup
                 told_at, told_version = now, version
             else:
                 late = now - told_at >= max(BEAT, -(-asked_ms // TICK_MS))
-                assert not late, "ages are told in time"
+                assert not late, "ages are shown in time"

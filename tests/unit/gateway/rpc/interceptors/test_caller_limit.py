@@ -52,7 +52,7 @@ class Ground:
 
 
 def dismiss(waiting: Awaitable[None]) -> None:
-    close = getattr(waiting, "close")  # noqa: B009  # a coroutine, which nobody awaits here
+    close = getattr(waiting, "close")  # noqa: B009  # a coroutine, which is not awaited here
     close()
 
 

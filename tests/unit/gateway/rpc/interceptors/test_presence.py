@@ -92,7 +92,7 @@ def test_one_that_comes_and_goes_without_end_is_reported_a_few_times() -> None:
     assert len(world.events) <= 2 * (REPORTED + minutes + 1)
     joined = [each for each in world.events if isinstance(each.detail, ClientJoined)]
     left = [each for each in world.events if isinstance(each.detail, ClientLeft)]
-    assert len(joined) == len(left), "whoever was seen to join is seen to leave"
+    assert len(joined) == len(left), "each that was seen to join is seen to leave"
 
 
 def test_and_how_often_it_came_meanwhile_is_said_with_the_next_report() -> None:

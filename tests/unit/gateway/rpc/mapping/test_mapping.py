@@ -156,7 +156,7 @@ def test_every_method_of_the_contract_has_a_handler() -> None:
     methods = Services(*[anything] * 6).methods()
     names = [method.name for service in SERVICES for method in service.methods]
     assert set(methods) == set(names)
-    assert len(methods) == len(names), "statistics tell methods apart by their names"
+    assert len(methods) == len(names), "statistics know methods by their names"
 
 
 def test_the_control_actions_are_these_and_a_viewer_may_only_stop() -> None:
@@ -310,7 +310,7 @@ def test_the_values_arrive_where_the_contract_has_them() -> None:
     assert (status.health.odom_age_ms, status.health.odom_stale) == (10_000, True)
     command = status.effective_command
     assert (command.vx_mps, command.vy_mps, command.wz_rad_s) == (0.25, -0.5, 0.75)
-    assert command.active_source == "unknown", "a stale command is nobody's"
+    assert command.active_source == "unknown", "a stale command has no source"
     assert status.mission.mode == "exploring"
     assert status.platform.power.lipo_battery.voltage == 15.0
     assert status.platform.power.onboard_battery.voltage == 12.0

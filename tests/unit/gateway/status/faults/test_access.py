@@ -1,4 +1,4 @@
-"""What the operators are told of the door: certificates near their end, files that can't be read."""
+"""What operators see of access: certificates near their end, files that can't be read."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The life of a fault, without a clock: every instant is told."""
+"""The life of a fault, without a clock: every instant is given."""
 
 import pytest
 from hypothesis import given
