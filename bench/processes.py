@@ -12,17 +12,13 @@ import psutil
 
 
 @contextmanager
-def program(*arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """`python -m ARGUMENTS`, from its "ready" on; ends when the block ends, by its standard input closing."""
+def piped_program(*arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """`python -m ARGUMENTS` with pipes; ends when the block ends, by its standard input closing."""
     with subprocess.Popen(
         [sys.executable, "-m", *arguments], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as process:
         assert process.stdin
-        assert process.stdout
         try:
-            line = process.stdout.readline()
-            if "ready" not in line:
-                raise RuntimeError(f"{arguments[0]} did not start: {line!r}")
             yield process
         finally:
             process.stdin.close()
@@ -30,6 +26,22 @@ def program(*arguments: str) -> Iterator[subprocess.Popen[str]]:
                 process.wait(10)
             except subprocess.TimeoutExpired:
                 process.kill()
+
+
+@contextmanager
+def program(*arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """The same, from its "ready" on."""
+    with piped_program(*arguments) as process:
+        line = first_line(process)
+        if "ready" not in line:
+            raise RuntimeError(f"{arguments[0]} did not start: {line!r}")
+        yield process
+
+
+def first_line(process: subprocess.Popen[str]) -> str:
+    """Returns the first line that a program prints."""
+    assert process.stdout
+    return process.stdout.readline()
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,10 +1,10 @@
 """Runs the whole gateway without ROS in a process of its own (bench.status_server)."""
 
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+
+from bench.processes import first_line, piped_program
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,15 +23,5 @@ def running_stack(*words: str) -> Iterator[Stack]:
         words: "limited" for the default rate limits; "guarded" and a directory of credentials for TLS and
             authentication.
     """
-    with subprocess.Popen(
-        [sys.executable, "-m", "bench.status_server", *words],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as process:
-        assert process.stdin
-        assert process.stdout
-        try:
-            yield Stack(process.pid, int(process.stdout.readline()))
-        finally:
-            process.stdin.close()
+    with piped_program("bench.status_server", *words) as process:
+        yield Stack(process.pid, int(first_line(process)))

@@ -9,17 +9,15 @@ with equal priority.
 import json
 import statistics
 import subprocess
-import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any
 
 import grpc
 
 from bench.calling import OWN_CONNECTION
-from bench.processes import cpu_seconds
+from bench.processes import cpu_seconds, program
 from bench.progress import log
 from bench.rows import Row
 from bench.stack import Stack, running_stack
@@ -135,23 +133,10 @@ def p99(values: list[float]) -> float:
     return statistics.quantiles(values, n=100)[98]
 
 
-@contextmanager
-def _load(stack: Stack, watchers: int, constants: int, *others: str) -> Iterator[subprocess.Popen[str]]:
-    words = [str(stack.port), str(watchers), str(constants), *others]
-    with subprocess.Popen(
-        [sys.executable, "-m", "bench.watch_load", *words],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as process:
-        assert process.stdin
-        assert process.stdout
-        try:
-            if "ready" not in process.stdout.readline():
-                raise RuntimeError("the watchers did not come up")
-            yield process
-        finally:
-            process.stdin.close()
+def _load(
+    stack: Stack, watchers: int, constants: int, *others: str
+) -> AbstractContextManager[subprocess.Popen[str]]:
+    return program("bench.watch_load", str(stack.port), str(watchers), str(constants), *others)
 
 
 def _received(load: subprocess.Popen[str]) -> list[int]:

@@ -1,7 +1,5 @@
 """How fast a recording is copied, against a bare gRPC stream of the same bytes to the same client."""
 
-import subprocess
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +8,7 @@ from typing import Final
 from bench.export import bare_server
 from bench.export.copying import Stream, copied
 from bench.export.ground import ExportingRobot
+from bench.processes import first_line, piped_program
 from bench.progress import log
 from bench.rows import FEWEST_ROUNDS, Row
 
@@ -56,14 +55,8 @@ def one_round(robot: ExportingRobot, bare_target: str) -> tuple[float, float]:
 @contextmanager
 def bare_stream(paths: Sequence[Path]) -> Iterator[str]:
     """Yields the address of a bare server of these files."""
-    words = [sys.executable, "-m", "bench.export.bare_server", *map(str, paths)]
-    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdin
-        assert process.stdout
-        try:
-            word, _, port = process.stdout.readline().partition(" ")
-            if word != "ready":
-                raise RuntimeError("the bare server did not start")
-            yield f"127.0.0.1:{int(port)}"
-        finally:
-            process.stdin.close()
+    with piped_program("bench.export.bare_server", *map(str, paths)) as process:
+        word, _, port = first_line(process).partition(" ")
+        if word != "ready":
+            raise RuntimeError("the bare server did not start")
+        yield f"127.0.0.1:{int(port)}"

@@ -5,13 +5,13 @@ the sender's standard output and input.
 """
 
 import json
-import subprocess
 import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
+from bench.processes import first_line, piped_program
 from bench.progress import log
 from bench.video import reference
 from bench.video.camera import Camera
@@ -51,20 +51,14 @@ def viewer(source: Camera) -> Iterator[PlainViewer]:
 
 @contextmanager
 def _connected(source: Camera) -> Iterator[PlainViewer]:
-    command = [sys.executable, "-m", "bench.video.webrtc", source.source]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as sender:
+    with piped_program("bench.video.webrtc", source.source) as sender:
         assert sender.stdin
-        assert sender.stdout
-        try:
-            pipeline = _receiver()
-            with PlainViewer(pipeline) as found:
-                answer = _answer(pipeline.get_by_name("peer"), json.loads(sender.stdout.readline()))
-                sender.stdin.write(json.dumps(answer) + "\n")
-                sender.stdin.flush()
-                yield found
-        finally:
-            sender.stdin.close()
-            sender.wait(_WITHIN_S)
+        pipeline = _receiver()
+        with PlainViewer(pipeline) as found:
+            answer = _answer(pipeline.get_by_name("peer"), json.loads(first_line(sender)))
+            sender.stdin.write(json.dumps(answer) + "\n")
+            sender.stdin.flush()
+            yield found
 
 
 def _receiver() -> Any:
