@@ -4,6 +4,7 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -139,4 +140,4 @@ class RingRecorder:
     async def drop_outdated(self) -> None:
         """Deletes the segments that are older than what is kept."""
         for segment in self._ring.outdated(time.monotonic_ns()):
-            await attempt("a segment of the ring stays", lambda each=segment: self._ring.drop(each))  # type: ignore[misc]
+            await attempt("a segment of the ring stays", partial(self._ring.drop, segment))

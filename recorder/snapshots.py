@@ -4,6 +4,7 @@ import asyncio
 import logging
 import time
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 from common.errors import InvalidRequestError, PreconditionError, TooMuchError
@@ -193,6 +194,18 @@ class Snapshots:
         self._incidents.made(fault_id, made, now_s)
         return made
 
+    async def link(self, segment: RingSegment) -> None:
+        """Adds a segment to the snapshots that it belongs to."""
+        for snapshot in self._pending:
+            manifest = self._catalogue.get(snapshot.id)
+            if manifest and segment.overlaps(snapshot.from_ns, snapshot.until_ns):
+                folder = self._catalogue.folder_of(manifest)
+                linking = partial(link_next, folder, manifest, segment)
+                linked = await attempt(f"{manifest.id} lacks a segment", linking)
+                if linked:
+                    snapshot.takes(segment)
+                await self._keep(linked or _lacking(manifest, segment))
+
     async def finish(self, recording_id: str, reason: StopReason) -> None:
         """Ends a snapshot whose last segment is final."""
         manifest = self._catalogue.get(recording_id)
@@ -242,20 +255,6 @@ class Snapshots:
             until_ns = time.time_ns() + self._settings.incidents.post_s * _NS_PER_S
             update = {"trigger": trigger, "window_ns": (before.window_ns[0], until_ns)}
             await self._keep(before.model_copy(update=update))
-
-    async def link(self, segment: RingSegment) -> None:
-        """Adds a segment to the snapshots that it belongs to."""
-        for snapshot in self._pending:
-            manifest = self._catalogue.get(snapshot.id)
-            if manifest and segment.overlaps(snapshot.from_ns, snapshot.until_ns):
-                folder = self._catalogue.folder_of(manifest)
-                linked = await attempt(
-                    f"{manifest.id} lacks a segment",
-                    lambda folder=folder, manifest=manifest: link_next(folder, manifest, segment),  # type: ignore[misc]
-                )
-                if linked:
-                    snapshot.takes(segment)
-                await self._keep(linked or _lacking(manifest, segment))
 
     async def _keep(self, manifest: Manifest) -> None:
         await attempt(

@@ -5,6 +5,7 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Final, TypeVar
 
 from common.errors import TooMuchError
@@ -103,7 +104,7 @@ class Housekeeping:
                 enough = need  # Nor does a recording that comes after the ring go for it.
             if self._expected_bytes >= enough:
                 break
-            if await attempt(f"{each.name} stays", lambda each=each: self._let_go(each)):  # type: ignore[misc]
+            if await attempt(f"{each.name} stays", partial(self._let_go, each)):
                 self._to_come.expect(freed, time.monotonic())
                 await self.measure()
         return self._expected_bytes >= need
