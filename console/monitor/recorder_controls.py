@@ -14,7 +14,7 @@ from console.client.results import (
 )
 from console.monitor.bar_items import BarItem
 from console.monitor.monitor_state import MonitorState
-from console.monitor.recordings_view import Asked, Change, ExportState, ExportView, RecordingsView
+from console.monitor.recordings_view import Change, ChangeRequest, ExportState, ExportView, RecordingsView
 from console.presentation.cloud import copy_text
 from console.presentation.formatting import age, joined, plural, size, wall_clock
 from console.presentation.preview_switch import Note
@@ -311,7 +311,7 @@ def _why_not_kept(status: RecordingStatus, view: RecordingsView, barred: str) ->
         if any(each.in_ring for each in status.presets):
             return "The ring is empty at the moment"
         return "This robot keeps no ring of the last seconds: set ring in the recorder's configuration"
-    return _faulted(status) or (WAITING if Asked(Change.KEEP) in view.pending else "")
+    return _faulted(status) or (WAITING if ChangeRequest(Change.KEEP) in view.pending else "")
 
 
 def _item(
@@ -355,7 +355,7 @@ def _export(each: Recording, view: RecordingsView, copy: ExportView | None, sile
 
 def _why_not_pinned(each: Recording, view: RecordingsView, barred: str) -> str:
     read_only = "The robot's own experiments are read-only" if each.kind is RecordingKind.RUN_BUNDLE else ""
-    pending = WAITING if Asked(Change.PIN, each.id) in view.pending else ""
+    pending = WAITING if ChangeRequest(Change.PIN, each.id) in view.pending else ""
     return barred or view.denied or read_only or pending
 
 
@@ -370,7 +370,7 @@ def _why_not_deleted(each: Recording, view: RecordingsView, barred: str, *, runs
         return "It is pinned: unpin it first"
     if view.exporting == each.id:
         return "It is being exported"
-    return WAITING if Asked(Change.DELETE, each.id) in view.pending else ""
+    return WAITING if ChangeRequest(Change.DELETE, each.id) in view.pending else ""
 
 
 def _copied(copy: ExportView) -> str:

@@ -1,4 +1,4 @@
-"""Recordings from a window: the list, its pictures, what an operator asks for, and exports (exports.py).
+"""Recordings from a window: the list, its pictures, what operators request, and exports (exports.py).
 
 Everything runs in the worker's loop. The list is requested when the recorder's state changes, and while it is
 shown every ten seconds besides.
@@ -33,7 +33,7 @@ from console.client.results import (
 from console.monitor.calls import Calls
 from console.monitor.exports import ExportingClient, Exports
 from console.monitor.notes import Notes
-from console.monitor.recordings_view import Asked, Change, ExportView, RecordingsView
+from console.monitor.recordings_view import Change, ChangeRequest, ExportView, RecordingsView
 from console.presentation.preview_switch import Note
 from console.presentation.severity_style import SeverityStyle
 
@@ -72,6 +72,10 @@ class RecordingClient(ExportingClient, Protocol):
 
     async def delete_recording(self, recording_id: str, *, expected_sha256: bytes = ...) -> RecordingDeleted:
         """Deletes a recording."""
+
+
+_Call = Callable[[RecordingClient], Awaitable[RecordingAnswer | RecordingDeleted]]
+"""Requests a change."""
 
 
 class RecordingRobot(Protocol):
@@ -122,8 +126,8 @@ class Recordings:
         """What of the recorder's status says that its recordings have changed."""
         self._again_s: float | None = None
         """Time until the next list without a change; None for none."""
-        self._listable, self._changed, self._visible = asyncio.Event(), asyncio.Event(), asyncio.Event()
-        self._to_picture: tuple[Recording, ...] = ()
+        self._listable, self._changed, self._shown_changed = asyncio.Event(), asyncio.Event(), asyncio.Event()
+        self._shown: tuple[Recording, ...] = ()
         self._denied_to: RecordingClient | None = None
 
     # --- any thread ---
@@ -152,30 +156,32 @@ class Recordings:
 
     def show_pictures(self, recordings: tuple[Recording, ...]) -> None:
         """Gets pictures for these recordings, which are the ones that can be seen."""
-        if recordings != self._to_picture:
-            self._to_picture = recordings
-            self._call_soon(self._visible.set)
+        if recordings != self._shown:
+            self._shown = recordings
+            self._call_soon(self._shown_changed.set)
 
     def start(self, label: str, preset: str) -> None:
         """Starts a recording."""
-        self._ask(Asked(Change.START), lambda robot: robot.start_recording(label, preset=preset))
+        self._request(ChangeRequest(Change.START), lambda robot: robot.start_recording(label, preset=preset))
 
     def stop(self, recording_id: str) -> None:
         """Stops the recording that was seen to run; another one goes on."""
-        self._ask(Asked(Change.STOP), lambda robot: robot.stop_recording(recording_id))
+        self._request(ChangeRequest(Change.STOP), lambda robot: robot.stop_recording(recording_id))
 
     def keep(self, label: str, seconds: int) -> None:
         """Keeps the last seconds."""
-        self._ask(Asked(Change.KEEP), lambda robot: robot.trigger_snapshot(label, pre_s=seconds))
+        self._request(ChangeRequest(Change.KEEP), lambda robot: robot.trigger_snapshot(label, pre_s=seconds))
 
     def pin(self, recording_id: str, pinned: bool) -> None:
         """Pins a recording, or ends that."""
-        self._ask(Asked(Change.PIN, recording_id), lambda robot: robot.pin_recording(recording_id, pinned))
+        self._request(
+            ChangeRequest(Change.PIN, recording_id), lambda robot: robot.pin_recording(recording_id, pinned)
+        )
 
     def delete(self, recording: Recording) -> None:
         """Deletes a recording as it was listed: one that has changed since stays."""
-        self._ask(
-            Asked(Change.DELETE, recording.id),
+        self._request(
+            ChangeRequest(Change.DELETE, recording.id),
             lambda robot: robot.delete_recording(recording.id, expected_sha256=recording.sha256),
         )
 
@@ -194,8 +200,8 @@ class Recordings:
         self._robot = robot
         try:
             async with asyncio.TaskGroup() as tasks:
-                tasks.create_task(self._keep_listed())
-                tasks.create_task(self._keep_pictured())
+                tasks.create_task(self._keep_list_current())
+                tasks.create_task(self._keep_pictures_current())
         finally:
             self._calls.cancel()
             await self._exports.end()
@@ -209,7 +215,7 @@ class Recordings:
         else:
             self._listable.clear()
 
-    async def _keep_listed(self) -> NoReturn:
+    async def _keep_list_current(self) -> NoReturn:
         while True:
             await self._listable.wait()
             self._changed.clear()
@@ -232,17 +238,17 @@ class Recordings:
         pictures = {name: picture for name, picture in self._view.pictures.items() if name in ids}
         self._update(listed=listed, more=bool(page.next_page_token), problem="", pictures=pictures)
 
-    async def _keep_pictured(self) -> NoReturn:
+    async def _keep_pictures_current(self) -> NoReturn:
         while True:
-            await self._visible.wait()
-            self._visible.clear()
-            if not await self._picture_visible():
+            await self._shown_changed.wait()
+            self._shown_changed.clear()
+            if not await self._fetch_pictures():
                 await asyncio.sleep(_PICTURES_AGAIN_S)
-                self._visible.set()
+                self._shown_changed.set()
 
-    async def _picture_visible(self) -> bool:
+    async def _fetch_pictures(self) -> bool:
         """Gets the pictures that are missing. Returns False where the robot did not answer."""
-        for recording in self._to_picture:
+        for recording in self._shown:
             if self._pictures is None or recording.id in self._view.pictures:
                 continue
             fetch = partial(self._robot.client.recording_thumbnail, recording.id)
@@ -255,25 +261,19 @@ class Recordings:
                 picture = b""
             self._update(pictures={**self._view.pictures, recording.id: picture})
             await asyncio.sleep(_LEAST_BETWEEN_PICTURES_S)
-            if self._visible.is_set():
+            if self._shown_changed.is_set():
                 break
         return True
 
-    def _ask(
-        self, asked: Asked, call: Callable[[RecordingClient], Awaitable[RecordingAnswer | RecordingDeleted]]
-    ) -> None:
-        self._call_soon(partial(self._begin, asked, call))
+    def _request(self, request: ChangeRequest, call: _Call) -> None:
+        self._call_soon(partial(self._begin, request, call))
 
-    def _begin(
-        self, asked: Asked, call: Callable[[RecordingClient], Awaitable[RecordingAnswer | RecordingDeleted]]
-    ) -> None:
-        if asked not in self._view.pending:
-            self._calls.start(partial(self._carry_out, asked, call))
+    def _begin(self, request: ChangeRequest, call: _Call) -> None:
+        if request not in self._view.pending:
+            self._calls.start(partial(self._carry_out, request, call))
 
-    async def _carry_out(
-        self, asked: Asked, call: Callable[[RecordingClient], Awaitable[RecordingAnswer | RecordingDeleted]]
-    ) -> None:
-        self._update(pending=self._view.pending | {asked})
+    async def _carry_out(self, request: ChangeRequest, call: _Call) -> None:
+        self._update(pending=self._view.pending | {request})
         client = self._robot.client
         try:
             self._notes.add((await call(client)).message, SeverityStyle.QUIET)
@@ -283,7 +283,7 @@ class Recordings:
                 self._denied_to = client
                 self._update(denied=error.what)
         finally:
-            self._update(pending=self._view.pending - {asked})
+            self._update(pending=self._view.pending - {request})
             self._changed.set()
 
     def _update_exports(self, exports: Mapping[str, ExportView]) -> None:

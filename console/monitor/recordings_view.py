@@ -1,4 +1,4 @@
-"""What a window shows of the recordings: the list, what an operator has asked for, and the exports."""
+"""What a window shows of the recordings: the list, what operators have requested, and the exports."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ from console.monitor.export_meter import ExportRate
 
 
 class Change(Enum):
-    """What an operator asks for."""
+    """What operators may request."""
 
     START = "start"
     STOP = "stop"
@@ -20,8 +20,8 @@ class Change(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
-    """A change, and the recording that it is for; empty for the one that runs."""
+class ChangeRequest:
+    """A request for a change of a recording; its ID is empty for the one that runs."""
 
     change: Change
     recording_id: str = ""
@@ -73,7 +73,7 @@ class RecordingsView:
     listed: tuple[Recording, ...] | None = None
     more: bool = False
     problem: str = ""
-    pending: frozenset[Asked] = frozenset()
+    pending: frozenset[ChangeRequest] = frozenset()
     denied: str = ""
     exports: Mapping[str, ExportView] = field(default_factory=dict)
     pictures: Mapping[str, bytes] = field(default_factory=dict)

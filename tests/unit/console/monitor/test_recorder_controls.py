@@ -25,7 +25,7 @@ from console.monitor.recorder_controls import (
     deletion_question,
     recorder_controls,
 )
-from console.monitor.recordings_view import Asked, Change, ExportState, ExportView, RecordingsView
+from console.monitor.recordings_view import Change, ChangeRequest, ExportState, ExportView, RecordingsView
 from console.presentation.severity_style import SeverityStyle
 from tests.support.played_recordings import DRIVING, ENDED, IDLE, RECORDS
 from tests.support.snapshots import NOW_S, heard, snapshot
@@ -230,7 +230,12 @@ def test_a_role_that_does_not_suffice_bars_every_change_but_no_copy() -> None:
 
 
 def test_what_the_robot_has_yet_to_answer_waits() -> None:
-    asked = {Asked(Change.START), Asked(Change.KEEP), Asked(Change.PIN, "one"), Asked(Change.DELETE, "one")}
+    asked = {
+        ChangeRequest(Change.START),
+        ChangeRequest(Change.KEEP),
+        ChangeRequest(Change.PIN, "one"),
+        ChangeRequest(Change.DELETE, "one"),
+    }
     now = of(IDLE, replace(LISTED, pending=frozenset(asked)))
     (only,) = now.items
     assert {now.record.reason, now.keep.reason, only.pin.reason, only.delete.reason} == {WAITING}

@@ -13,7 +13,7 @@ from console.client.errors import GatewayFailed, NotAllowed, Overloaded, Refused
 from console.client.results import RecorderState, RecordingThumbnail
 from console.monitor import recordings as module
 from console.monitor.recordings import Recordings
-from console.monitor.recordings_view import Asked, Change, ExportState
+from console.monitor.recordings_view import Change, ChangeRequest, ExportState
 from console.presentation.severity_style import SeverityStyle
 from tests.support.eventually import eventually
 from tests.support.played_recordings import ENDED, IDLE, RECORDS, PlayedRecordings
@@ -162,7 +162,7 @@ async def test_what_is_pending_is_not_asked_twice() -> None:
     async with served() as now:
         now.robot.answers.clear()
         now.recordings.start("", "")
-        await now.until(lambda: Asked(Change.START) in now.recordings.view().pending, "it is pending")
+        await now.until(lambda: ChangeRequest(Change.START) in now.recordings.view().pending, "it is pending")
         now.recordings.start("", "")
         now.recordings.pin("one", True)
         await now.until(lambda: len(now.robot.asked) == 2, "something else may be asked meanwhile")
