@@ -396,7 +396,7 @@ class Hub:
         while True:
             session = await self._try_servers()
             if session is None:
-                # Full jitter between half and all of it: a fleet does not come back in step.
+                # Equal jitter, between half and all of it: a fleet does not come back in step.
                 await asyncio.sleep(backoff.next_s() * random.uniform(0.5, 1.0))  # noqa: S311
                 continue
             since_s = loop.time()
