@@ -27,12 +27,22 @@ class _Sequence:
         at_ns: its log time.
         published_ns: its source time; -1 if unknown.
         known: whether it was there at the last `collect`.
+        ahead: whether it may have had messages of one that is known, with which it was level.
     """
 
     last: int
     at_ns: int
     published_ns: int
     known: bool = False
+    ahead: bool = False
+
+    @property
+    def nearness(self) -> tuple[int, bool, int]:
+        """The greatest is taken of those below a number: of two at the same number, the newer one.
+
+        The other may be of a publisher that has gone.
+        """
+        return self.last, not self.known, self.at_ns
 
 
 @dataclass(slots=True)
@@ -97,10 +107,11 @@ class LossCounter:
         for each in self._sequences:
             if each.last == number and each.published_ns == published_ns > 0:
                 return  # The same once more: what a transient local publisher keeps for late subscribers.
-            # Of two that are as near the newer one: the other may be of a publisher that has gone.
-            if each.last < number and (below is None or (each.last, each.at_ns) > (below.last, below.at_ns)):
+            if each.last < number and (below is None or each.nearness > below.nearness):
                 below = each
         if below and below.last == number - 1:
+            if not below.known and any(each.known and each.last == below.last for each in self._sequences):
+                below.ahead = True
             below.last, below.at_ns, below.published_ns = number, at_ns, published_ns
         elif maybe_history and any(_is_older(number, published_ns, each) for each in self._sequences):
             self._found(number)
@@ -118,7 +129,7 @@ class LossCounter:
             elif len(self._restarts) < _MAX_RANGES:
                 self._restarts.append((oldest.at_ns, at_ns))
             oldest.last, oldest.at_ns, oldest.published_ns = number, at_ns, published_ns
-            oldest.known = False
+            oldest.known = oldest.ahead = False
 
     def collect(self, publishers: frozenset[Hashable] | None) -> Lost | None:
         """Returns what has been missing since the last call.
@@ -136,7 +147,7 @@ class LossCounter:
         missing, self._missing = self._missing, []
         restarts, self._restarts = self._restarts, []
         for each in self._sequences:
-            each.known = True
+            each.known, each.ahead = True, False
         self._before, self._surplus_before = [replace(each) for each in self._sequences], self._surplus
         self._recent.clear()
         times = [*((each.began_ns, each.ended_ns) for each in missing), *restarts]
@@ -162,9 +173,10 @@ class LossCounter:
         none_stays = bool(self._publishers) and self._publishers.isdisjoint(publishers)
         self._publishers, self._expected = publishers, _bounded(len(publishers))
         if none_stays:
-            # Of a publisher that has taken the place of another, nothing is known but what it has sent since.
+            # Of a publisher that has taken the place of another, nothing is known but what it has sent since;
+            # and of that it is not known how much is the other's where they were level.
             new = [each for each in self._sequences if not each.known]
-            gone -= len(self._sequences) - len(new)
+            gone -= len(self._sequences) - len(new) - sum(each.ahead for each in new)
             self._sequences = new
         surplus = max(0, len(self._sequences) - self._expected)
         self._sequences.sort(key=lambda each: each.at_ns)

@@ -122,6 +122,32 @@ def test_a_publisher_that_was_heard_once_before_another_took_its_place_is_no_gap
     another_takes_its_place(counter)
 
 
+def test_a_message_that_fits_the_publisher_and_the_one_in_its_place_makes_no_restart(
+    counter: LossCounter,
+) -> None:
+    """The defect: it was taken for the latter's, and the latter's own one for a restart."""
+    take(counter, [1])
+    assert counter.collect(ONE) is None
+    for at, number in enumerate([1, 2, 3], 1000):  # the first is of b, the others of a
+        counter.take(number, at)
+    assert counter.collect(frozenset({"b"})) is None
+    counter.take(2, 2000)
+    assert counter.collect(frozenset({"b"})) is None
+
+
+def test_what_a_publisher_sends_while_it_is_level_with_the_one_whose_place_it_takes_is_its_own(
+    counter: LossCounter,
+) -> None:
+    """The defect: it was taken for the former one's, and forgotten with it."""
+    take(counter, range(1, 6))
+    assert counter.collect(ONE) is None
+    for at, number in enumerate([1, 2, 3, 4, 5, 6, 6, 7], 1000):  # one of the sixth is of a
+        counter.take(number, at)
+    assert counter.collect(frozenset({"b"})) is None
+    counter.take(8, 2000)
+    assert counter.collect(frozenset({"b"})) is None
+
+
 def test_two_publishers_of_which_one_leaves_before_the_graph_is_examined_are_no_gap() -> None:
     counter = LossCounter()
     counter.collect(ONE)
