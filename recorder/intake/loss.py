@@ -182,7 +182,7 @@ class LossCounter:
         self._sequences.sort(key=lambda each: each.at_ns)
         del self._sequences[:surplus]
         # Which ones they are is not known: one that was kept may be of a publisher that has gone.
-        self._surplus = max(surplus, min(gone, len(self._sequences)))
+        self._surplus = max(surplus, min(gone + self._surplus, len(self._sequences)))
 
     def _found(self, number: int) -> bool:
         """Removes a number from the missing ones; returns whether it was one."""

@@ -213,6 +213,18 @@ def test_a_number_that_starts_again_after_its_greatest_is_a_restart(counter: Los
     assert found.messages is None
 
 
+def test_a_sequence_of_one_that_has_gone_is_remembered_as_such_when_others_join() -> None:
+    """The defect: the first message of one of them was a restart."""
+    counter = LossCounter()
+    counter.collect(ONE)
+    counter.take(3, 1)
+    assert counter.collect(frozenset({"b"})) is None
+    assert counter.collect(frozenset({"b", "c"})) is None
+    counter.take(1, 2, published_ns=2)
+    counter.take(1, 3, published_ns=3)
+    assert counter.collect(frozenset({"b", "c"})) is None
+
+
 def test_a_publisher_that_leaves_others_is_no_gap(counter: LossCounter) -> None:
     """Its number was the newest: the one of those that stay is taken for it, and found again."""
     counter.collect(frozenset({"a", "b"}))
