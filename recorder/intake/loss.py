@@ -8,6 +8,7 @@ that there were meanwhile. How many are missing is unknown while nothing is know
 one was started again without the graph showing another one: how far the former one had come is not known.
 """
 
+from collections import deque
 from collections.abc import Hashable
 from dataclasses import dataclass, replace
 from typing import Final
@@ -16,6 +17,8 @@ _MAX_SEQUENCES: Final = 256
 _MAX_RANGES: Final = 1024
 _MAX_RECENT: Final = 100_000
 """Numbers that are kept to go through them again: those of a second, at up to 100 kHz."""
+_MAX_ASIDE: Final = 10_000
+"""Messages that are kept although they may be history: those of ten seconds, at up to 1 kHz."""
 
 
 @dataclass(slots=True)
@@ -47,12 +50,14 @@ class _Sequence:
 
 @dataclass(slots=True)
 class _Missing:
-    """Numbers `first` to `last` of a sequence, between two messages."""
+    """Numbers `first` to `last` of a sequence, between two messages, by their log times and source times."""
 
     first: int
     last: int
     began_ns: int
     ended_ns: int
+    published_from_ns: int
+    published_until_ns: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +90,12 @@ class LossCounter:
         self._before: list[_Sequence] = []
         """The sequences as they were at the last `collect`, and in `_recent` what has come since."""
         self._surplus_before = 0
+        self._aside: deque[tuple[int, int, int]] = deque(maxlen=_MAX_ASIDE)
+        """Number, log time and source time of those that may be history: no sequence has moved for them.
+
+        Where one of them was live all the same, it is not missing.
+        """
+        self._aside_before = self._aside.copy()
         self._recent: list[tuple[int, int, int, bool]] = []
 
     def take(self, number: int, at_ns: int, published_ns: int = -1, *, maybe_history: bool = False) -> None:
@@ -112,24 +123,19 @@ class LossCounter:
         if below and below.last == number - 1:
             if not below.known and any(each.known and each.last == below.last for each in self._sequences):
                 below.ahead = True
-            below.last, below.at_ns, below.published_ns = number, at_ns, published_ns
+            self._advance(below, number, at_ns, published_ns)
         elif maybe_history and any(_is_older(number, published_ns, each) for each in self._sequences):
-            self._found(number)
+            if not self._found(number, published_ns):
+                self._aside.append((number, at_ns, published_ns))
         elif len(self._sequences) < self._expected:
             self._sequences.append(_Sequence(number, at_ns, published_ns))
         elif below:
-            self._missing.append(_Missing(below.last + 1, number - 1, below.at_ns, at_ns))
-            below.last, below.at_ns, below.published_ns = number, at_ns, published_ns
-            self._bound()
-        elif not self._found(number):
-            # Lower than all, and not late: a publisher that was started again.
-            oldest = min(self._sequences, key=lambda each: each.at_ns)
-            if self._surplus:
-                self._surplus -= 1  # Or one whose sequence was taken for that of a publisher that has gone.
-            elif len(self._restarts) < _MAX_RANGES:
-                self._restarts.append((oldest.at_ns, at_ns))
-            oldest.last, oldest.at_ns, oldest.published_ns = number, at_ns, published_ns
-            oldest.known = oldest.ahead = False
+            between = [each for each in self._aside if each[0] < number and each[2] <= published_ns]
+            for each in sorted(each for each in between if _may_follow(below, *each)):
+                self._advance(below, *each)
+            self._advance(below, number, at_ns, published_ns)
+        elif not self._found(number, published_ns):
+            self._restart(number, at_ns, published_ns)
 
     def collect(self, publishers: frozenset[Hashable] | None) -> Lost | None:
         """Returns what has been missing since the last call.
@@ -149,6 +155,11 @@ class LossCounter:
         for each in self._sequences:
             each.known, each.ahead = True, False
         self._before, self._surplus_before = [replace(each) for each in self._sequences], self._surplus
+        self._aside = deque(
+            (note for note in self._aside if any(_may_follow(each, *note) for each in self._sequences)),
+            maxlen=_MAX_ASIDE,
+        )
+        self._aside_before = self._aside.copy()
         self._recent.clear()
         times = [*((each.began_ns, each.ended_ns) for each in missing), *restarts]
         if not times:
@@ -163,6 +174,7 @@ class LossCounter:
         """Takes what has come since the last `collect` for messages of these publishers."""
         self._sequences = [replace(each) for each in self._before]
         self._missing, self._restarts, self._surplus = [], [], self._surplus_before
+        self._aside = self._aside_before.copy()
         self._expected = _bounded(len(publishers))
         for message in self._recent:
             self._take(*message)
@@ -184,14 +196,33 @@ class LossCounter:
         # Which ones they are is not known: one that was kept may be of a publisher that has gone.
         self._surplus = max(surplus, min(gone + self._surplus, len(self._sequences)))
 
-    def _found(self, number: int) -> bool:
-        """Removes a number from the missing ones; returns whether it was one."""
+    def _advance(self, sequence: _Sequence, number: int, at_ns: int, published_ns: int) -> None:
+        """Takes a message for the newest of a sequence: the numbers before it are missing."""
+        if number > sequence.last + 1:
+            self._missing.append(
+                _Missing(
+                    sequence.last + 1, number - 1, sequence.at_ns, at_ns, sequence.published_ns, published_ns
+                )
+            )
+            self._bound()
+        sequence.last, sequence.at_ns, sequence.published_ns = number, at_ns, published_ns
+
+    def _restart(self, number: int, at_ns: int, published_ns: int) -> None:
+        """Takes a message that is lower than all, and not late: a publisher was started again."""
+        oldest = min(self._sequences, key=lambda each: each.at_ns)
+        if self._surplus:
+            self._surplus -= 1  # Or it is one whose sequence was taken for that of a publisher that has gone.
+        elif len(self._restarts) < _MAX_RANGES:
+            self._restarts.append((oldest.at_ns, at_ns))
+        self._sequences.remove(oldest)
+        self._sequences.append(_Sequence(number, at_ns, published_ns))
+
+    def _found(self, number: int, published_ns: int) -> bool:
+        """Removes a message from the missing ones; returns whether it was one."""
         for at, each in enumerate(self._missing):
-            if each.first <= number <= each.last:
-                rest = [
-                    _Missing(each.first, number - 1, each.began_ns, each.ended_ns),
-                    _Missing(number + 1, each.last, each.began_ns, each.ended_ns),
-                ]
+            in_time = published_ns < 1 or each.published_from_ns <= published_ns <= each.published_until_ns
+            if each.first <= number <= each.last and in_time:
+                rest = [replace(each, last=number - 1), replace(each, first=number + 1)]
                 self._missing[at : at + 1] = [part for part in rest if part.first <= part.last]
                 return True
         return False
@@ -202,12 +233,17 @@ class LossCounter:
             first, second = self._missing[:2]
             count = (first.last - first.first + 1) + (second.last - second.first + 1)
             # Numbers that no message has: below 1.
-            self._missing[:2] = [_Missing(1 - count, 0, first.began_ns, second.ended_ns)]
+            self._missing[:2] = [replace(first, first=1 - count, last=0, ended_ns=second.ended_ns)]
 
 
 def _is_older(number: int, published_ns: int, sequence: _Sequence) -> bool:
     """Returns whether a message is from before the newest of a sequence, by number and by source time."""
     return number <= sequence.last and 0 < published_ns <= sequence.published_ns
+
+
+def _may_follow(sequence: _Sequence, number: int, _at_ns: int, published_ns: int) -> bool:
+    """Returns whether a message is from after the newest of a sequence, by number and by source time."""
+    return number > sequence.last and published_ns >= sequence.published_ns
 
 
 def _bounded(publishers: int) -> int:

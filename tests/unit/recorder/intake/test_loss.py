@@ -237,6 +237,49 @@ def test_a_publisher_that_leaves_others_is_no_gap(counter: LossCounter) -> None:
     assert counter.collect(ONE) is None
 
 
+@pytest.mark.parametrize("graph", [frozenset({"a", "b"}), ONE], ids=["the same", "one has gone"])
+def test_one_that_is_missing_of_those_that_may_be_history_is_one(graph: frozenset[Hashable]) -> None:
+    """The defect: all that the publisher with the lower numbers sent from there on counted as missing."""
+    counter = LossCounter()
+    counter.collect(frozenset({"a", "b"}))
+    counter.take(700, 0, published_ns=1_000)
+    counter.take(6, 1, published_ns=106)
+    for number in range(8, 20):
+        counter.take(number, number, published_ns=100 + number, maybe_history=True)
+        assert counter.collect(frozenset({"a", "b"})) is None, "not known yet whether it is history"
+    counter.take(20, 20, published_ns=120)
+    found = counter.collect(graph)
+    assert found
+    assert (found.messages, found.began_ns, found.ended_ns) == (1, 1, 8)
+    counter.take(22, 22, published_ns=122)
+    assert lost(counter, graph) == 1
+
+
+def test_history_of_one_publisher_finds_nothing_of_what_another_lacks() -> None:
+    counter = LossCounter()
+    counter.collect(frozenset({"a", "b"}))
+    counter.take(700, 0, published_ns=1_000)
+    counter.take(600, 1, published_ns=5_000)
+    for number in range(605, 651):
+        counter.take(number, number, published_ns=300 + number, maybe_history=True)
+    counter.take(611, 1_000, published_ns=6_000)
+    for number in (605, 606):
+        counter.take(number, 1_001, published_ns=300 + number, maybe_history=True)
+    assert lost(counter, frozenset({"a", "b"})) == 10
+
+
+def test_what_may_be_history_is_kept_in_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(loss, "_MAX_ASIDE", 10)
+    counter = LossCounter()
+    counter.collect(frozenset({"a", "b"}))
+    counter.take(700, 0, published_ns=1_000)
+    counter.take(6, 1, published_ns=106)
+    for number in range(8, 28):
+        counter.take(number, number, published_ns=100 + number, maybe_history=True)
+    counter.take(28, 28, published_ns=128)
+    assert lost(counter, frozenset({"a", "b"})) == 11, "those that were forgotten, too"
+
+
 def test_where_messages_have_no_numbers_nothing_is_counted(counter: LossCounter) -> None:
     take(counter, [0, 0, 0])
     assert lost(counter, ONE) == 0
