@@ -96,9 +96,17 @@ class LossCounter:
         Where one of them was live all the same, it is not missing.
         """
         self._aside_before = self._aside.copy()
-        self._recent: list[tuple[int, int, int, bool]] = []
+        self._recent: list[tuple[int, int, int, bool, bool]] = []
 
-    def take(self, number: int, at_ns: int, published_ns: int = -1, *, maybe_history: bool = False) -> None:
+    def take(
+        self,
+        number: int,
+        at_ns: int,
+        published_ns: int = -1,
+        *,
+        maybe_history: bool = False,
+        aside: bool = False,
+    ) -> None:
         """Notes a message.
 
         Args:
@@ -106,14 +114,18 @@ class LossCounter:
             at_ns: log time.
             published_ns: source time, which two messages of one number do not share; below 1 if unknown.
             maybe_history: whether it may be one that a publisher had kept, and of which newer ones are known.
+            aside: whether it comes once more if it is none: it is not missing, and no sequence moves for it.
         """
         if number < 1:
             return
         if len(self._recent) <= _MAX_RECENT:
-            self._recent.append((number, at_ns, published_ns, maybe_history))
-        self._take(number, at_ns, published_ns, maybe_history)
+            self._recent.append((number, at_ns, published_ns, maybe_history, aside))
+        self._take(number, at_ns, published_ns, maybe_history, aside)
 
-    def _take(self, number: int, at_ns: int, published_ns: int, maybe_history: bool) -> None:
+    def _take(self, number: int, at_ns: int, published_ns: int, maybe_history: bool, aside: bool) -> None:
+        if aside:
+            self._set_aside(number, at_ns, published_ns)
+            return
         below: _Sequence | None = None
         for each in self._sequences:
             if each.last == number and each.published_ns == published_ns > 0:
@@ -125,8 +137,7 @@ class LossCounter:
                 below.ahead = True
             self._advance(below, number, at_ns, published_ns)
         elif maybe_history and any(_is_older(number, published_ns, each) for each in self._sequences):
-            if not self._found(number, published_ns):
-                self._aside.append((number, at_ns, published_ns))
+            self._set_aside(number, at_ns, published_ns)
         elif len(self._sequences) < self._expected:
             self._sequences.append(_Sequence(number, at_ns, published_ns))
         elif below:
@@ -195,6 +206,11 @@ class LossCounter:
         del self._sequences[:surplus]
         # Which ones they are is not known: one that was kept may be of a publisher that has gone.
         self._surplus = max(surplus, min(gone + self._surplus, len(self._sequences)))
+
+    def _set_aside(self, number: int, at_ns: int, published_ns: int) -> None:
+        """Keeps a message that may be history, unless it was missing."""
+        if not self._found(number, published_ns):
+            self._aside.append((number, at_ns, published_ns))
 
     def _advance(self, sequence: _Sequence, number: int, at_ns: int, published_ns: int) -> None:
         """Takes a message for the newest of a sequence: the numbers before it are missing."""

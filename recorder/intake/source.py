@@ -64,7 +64,7 @@ class Source:
         None if it has no history.
         """
         self._withheld: dict[_Key, None] = {}
-        """Messages that were not counted for it: they were live if they come by the present one, too."""
+        """Messages that were set aside for it: they were live if they come by the present one, too."""
         self._history_ends_at_s: float | None = None
         """Until when what the present subscription has may be history; None if it is none."""
         self._measured_from_s = now.monotonic_s
@@ -84,7 +84,10 @@ class Source:
         if self._next:
             more = self._fresh(following)
             switches = now.monotonic_s >= self._switch_at_s
-            self._count(more if switches else self._live(more), self._history_until_ns is not None)
+            if switches:
+                self._count(more, self._history_until_ns is not None)
+            else:
+                self._count_following(more)
             samples += more
             if switches:
                 self._switch(now)
@@ -162,19 +165,24 @@ class Source:
             )
             self._newest_ns = max(self._newest_ns, each.publish_time_ns)
 
+    def _count_following(self, samples: Sequence[Sample]) -> None:
+        """Counts what the next subscription has, and sets aside what may be history."""
+        until_ns = self._history_until_ns
+        if until_ns is None:
+            self._count(samples, False)
+            return
+        withheld = [each for each in samples if each.publish_time_ns <= until_ns]
+        for each in withheld:
+            # It may be live, and the queue of the present subscription too full for it.
+            self._loss.take(each.sequence, each.log_time_ns, each.publish_time_ns, aside=True)
+        _remember(self._withheld, withheld)
+        self._count([each for each in samples if each.publish_time_ns > until_ns], True)
+
     def _uncounted(self, samples: list[Sample]) -> list[Sample]:
         """Returns those of the present subscription that were not counted when the next one had them."""
         if not self._recent:
             return samples  # as on every topic that is neither latched nor has a next subscription
         return [each for each in samples if (key := _key(each)) not in self._recent or key in self._withheld]
-
-    def _live(self, samples: Sequence[Sample]) -> list[Sample]:
-        """Returns the samples of the next subscription that are no history; withholds the others."""
-        if self._history_until_ns is None:
-            return list(samples)
-        withheld = [each for each in samples if each.publish_time_ns <= self._history_until_ns]
-        _remember(self._withheld, withheld)
-        return [each for each in samples if each.publish_time_ns > self._history_until_ns]
 
     def _switch(self, now: Instant) -> None:
         self._node.destroy_subscription(self._subscription)

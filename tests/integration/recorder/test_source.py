@@ -126,6 +126,30 @@ def test_a_live_message_of_a_clock_that_lags_is_not_lost_if_the_next_subscriptio
     assert lost.messages == 1
 
 
+def test_a_live_message_of_a_clock_that_lags_is_not_lost_if_the_next_subscription_alone_has_it() -> None:
+    """The defect: where the former one's queue ran over, it was recorded, and counted as lost."""
+    replaced = Replaced(Offer((1,)), Offer((2,)))
+    replaced.former.receive((500, 1), (1, -100), (2, -99))
+    replaced.take(1)
+    following = replaced.replace(2)
+    following.receive((3, -98), (4, -97))
+    assert replaced.take(2.1) == [3, 4]
+    replaced.former.receive((4, -97), (6, -95))
+    following.receive((5, -96), (6, -95))
+    assert replaced.take(2.2) == [6, 5]
+    assert replaced.update(2.3) is None
+    following.receive((7, -94), (8, -93))
+    replaced.take(2.4)
+    following.receive((10, -91))
+    assert replaced.take(2 + OVERLAP_S) == [10]
+    assert not replaced.take(20)
+    following.receive((11, -90), (501, 5))
+    replaced.take(60)
+    lost = replaced.update(60)
+    assert lost
+    assert lost.messages == 1
+
+
 def test_history_is_no_gap_where_nothing_was_heard_before_the_replacement(replaced: Replaced) -> None:
     """The defect: a live message that came before it made it a restart, a gap of unknown size."""
     following = replaced.replace(2)

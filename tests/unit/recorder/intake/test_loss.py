@@ -255,6 +255,21 @@ def test_one_that_is_missing_of_those_that_may_be_history_is_one(graph: frozense
     assert lost(counter, graph) == 1
 
 
+@pytest.mark.parametrize("first", [True, False], ids=["before", "after"])
+def test_what_came_by_another_way_is_neither_missing_nor_the_newest(
+    counter: LossCounter, first: bool
+) -> None:
+    take(counter, [1])
+    for number, aside in [(2, True), (4, False)] if first else [(4, False), (2, True)]:
+        counter.take(number, number * 10, aside=aside)
+    for number in (5, 6):
+        counter.take(number, number * 10, aside=True)
+    counter.take(5, 50)
+    found = counter.collect(ONE)
+    assert found
+    assert (found.messages, found.ended_ns) == (1, 40)
+
+
 def test_history_of_one_publisher_finds_nothing_of_what_another_lacks() -> None:
     counter = LossCounter()
     counter.collect(frozenset({"a", "b"}))
