@@ -2,23 +2,33 @@
 
 DDS numbers the messages of each publisher (DDSI-RTPS 8.3.5.4). rclpy hands the number over, but not the
 publisher. Of one publisher the count is exact. Of several, each number is taken for the next of the sequence
-that it fits best: exact while their numbers are apart, close otherwise, and 0 where nothing was lost. When
-publishers have come or gone, the numbers since they were looked at last are gone through once more, as of all
-that there were meanwhile. How many are missing is unknown while nothing is known of the publishers, and where
-one was started again without the graph showing another one: how far the former one had come is not known.
+that it fits best: exact while their numbers are apart, close otherwise, and 0 where nothing was lost.
+
+A publisher that has gone counts as one that is silent, until all that are there were heard: which sequence
+was its own is not known. When the graph shows others, the numbers since it was looked at last are gone
+through once more, as of all that there were meanwhile. A message that may be history moves no sequence: it is
+set aside, and is no part of a gap that it fits.
+
+How many are missing is unknown while nothing is known of the publishers, and where one was started again
+without the graph showing another one: how far the former one had come is not known.
 """
 
 from collections import deque
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 _MAX_SEQUENCES: Final = 256
+_MAX_GONE: Final = 16
+"""More of them, and the one that was silent for longest is forgotten."""
 _MAX_RANGES: Final = 1024
 _MAX_RECENT: Final = 100_000
 """Numbers that are kept to go through them again: those of a second, at up to 100 kHz."""
-_MAX_ASIDE: Final = 10_000
-"""Messages that are kept although they may be history: those of ten seconds, at up to 1 kHz."""
+_MAX_ASIDE: Final = 5_000
+"""Messages that are kept although they may be history: those of ten seconds, at up to 500 Hz."""
+
+_Note = tuple[int, int, int]
+"""Number, log time and source time of a message."""
 
 
 @dataclass(slots=True)
@@ -29,23 +39,13 @@ class _Sequence:
         last: number of the newest.
         at_ns: its log time.
         published_ns: its source time; -1 if unknown.
-        known: whether it was there at the last `collect`.
-        ahead: whether it may have had messages of one that is known, with which it was level.
+        heard: whether its publisher is there: a message came after all that those had sent that have gone.
     """
 
     last: int
     at_ns: int
     published_ns: int
-    known: bool = False
-    ahead: bool = False
-
-    @property
-    def nearness(self) -> tuple[int, bool, int]:
-        """The greatest is taken of those below a number: of two at the same number, the newer one.
-
-        The other may be of a publisher that has gone.
-        """
-        return self.last, not self.known, self.at_ns
+    heard: bool = False
 
 
 @dataclass(slots=True)
@@ -82,16 +82,17 @@ class LossCounter:
         self._missing: list[_Missing] = []
         self._restarts: list[tuple[int, int]] = []
         """Log times of the messages around each: nothing says how many are missing of the former one."""
-        self._surplus = 0
-        """How many of the sequences may be those of publishers that have gone, while others stayed."""
         self._publishers: frozenset[Hashable] = frozenset()
+        self._gone = 0
+        """How many have gone whose sequences may still be there: which ones they are is not known."""
+        self._settled = False
+        """Whether none had come or gone at the last `collect`."""
         self._expected = 1
-        """How many publishers there are, as far as is known."""
+        """How many sequences there are at most, as far as is known."""
         self._before: list[_Sequence] = []
         """The sequences as they were at the last `collect`, and in `_recent` what has come since."""
-        self._surplus_before = 0
-        self._aside: deque[tuple[int, int, int]] = deque(maxlen=_MAX_ASIDE)
-        """Number, log time and source time of those that may be history: no sequence has moved for them.
+        self._aside: deque[_Note] = deque(maxlen=_MAX_ASIDE)
+        """Those that may be history: no sequence has moved for them.
 
         Where one of them was live all the same, it is not missing.
         """
@@ -120,31 +121,36 @@ class LossCounter:
             return
         if len(self._recent) <= _MAX_RECENT:
             self._recent.append((number, at_ns, published_ns, maybe_history, aside))
-        self._take(number, at_ns, published_ns, maybe_history, aside)
+        if (
+            len(self._sequences) == 1
+            and self._sequences[0].last == number - 1
+            and not (maybe_history or aside)
+        ):
+            self._next(self._sequences[0], [], (number, at_ns, published_ns))  # as nearly always
+        else:
+            self._take(number, at_ns, published_ns, maybe_history, aside)
 
     def _take(self, number: int, at_ns: int, published_ns: int, maybe_history: bool, aside: bool) -> None:
         if aside:
             self._set_aside(number, at_ns, published_ns)
             return
-        below: _Sequence | None = None
-        for each in self._sequences:
-            if each.last == number and each.published_ns == published_ns > 0:
-                return  # The same once more: what a transient local publisher keeps for late subscribers.
-            if each.last < number and (below is None or each.nearness > below.nearness):
-                below = each
-        if below and below.last == number - 1:
-            if not below.known and any(each.known and each.last == below.last for each in self._sequences):
-                below.ahead = True
-            self._advance(below, number, at_ns, published_ns)
-        elif maybe_history and any(_is_older(number, published_ns, each) for each in self._sequences):
+        if any(each.last == number and each.published_ns == published_ns > 0 for each in self._sequences):
+            return  # The same once more: what a transient local publisher keeps for late subscribers.
+        if maybe_history and any(_is_older(number, published_ns, each) for each in self._sequences):
             self._set_aside(number, at_ns, published_ns)
-        elif len(self._sequences) < self._expected:
-            self._sequences.append(_Sequence(number, at_ns, published_ns))
-        elif below:
-            between = [each for each in self._aside if each[0] < number and each[2] <= published_ns]
-            for each in sorted(each for each in between if _may_follow(below, *each)):
-                self._advance(below, *each)
-            self._advance(below, number, at_ns, published_ns)
+            return
+        may_be_first = len(self._sequences) < self._expected
+        below = [each for each in self._sequences if each.last < number]
+        if maybe_history:
+            in_time = [each for each in below if each.published_ns <= published_ns]
+            below = in_time if in_time or may_be_first else below
+        nearest, between = self._nearest(below, number, published_ns)
+        if nearest and nearest.last + len(between) == number - 1:
+            self._next(nearest, between, (number, at_ns, published_ns))
+        elif may_be_first:
+            self._sequences.append(_Sequence(number, at_ns, published_ns, self._settled))
+        elif nearest:
+            self._advance(nearest, *between, (number, at_ns, published_ns))
         elif not self._found(number, published_ns):
             self._restart(number, at_ns, published_ns)
 
@@ -155,17 +161,16 @@ class LossCounter:
             publishers: identities of those that the graph has now; None if it can't be examined.
         """
         exact = publishers is not None
+        self._settled = publishers == self._publishers
         # While the graph shows no publisher, the former ones stay known.
-        if publishers and publishers != self._publishers:
+        if publishers and not self._settled:
             exact = len(self._recent) <= _MAX_RECENT
-            if exact:
-                self._go_through_again(publishers | self._publishers)
-            self._expect(publishers)
+            self._expect(publishers, again=exact)
+        elif self._settled:
+            self._forget_what_has_gone()
         missing, self._missing = self._missing, []
         restarts, self._restarts = self._restarts, []
-        for each in self._sequences:
-            each.known, each.ahead = True, False
-        self._before, self._surplus_before = [replace(each) for each in self._sequences], self._surplus
+        self._before = [replace(each) for each in self._sequences]
         self._aside = deque(
             (note for note in self._aside if any(_may_follow(each, *note) for each in self._sequences)),
             maxlen=_MAX_ASIDE,
@@ -181,57 +186,76 @@ class LossCounter:
             ended_ns=max(ended_ns for _, ended_ns in times),
         )
 
-    def _go_through_again(self, publishers: frozenset[Hashable]) -> None:
-        """Takes what has come since the last `collect` for messages of these publishers."""
-        self._sequences = [replace(each) for each in self._before]
-        self._missing, self._restarts, self._surplus = [], [], self._surplus_before
-        self._aside = self._aside_before.copy()
-        self._expected = _bounded(len(publishers))
-        for message in self._recent:
-            self._take(*message)
+    def _expect(self, publishers: frozenset[Hashable], *, again: bool) -> None:
+        """Knows the publishers from now on.
 
-    def _expect(self, publishers: frozenset[Hashable]) -> None:
-        """Knows the publishers from now on; forgets the oldest sequences of those that have gone."""
-        gone = len(self._publishers - publishers)
-        none_stays = bool(self._publishers) and self._publishers.isdisjoint(publishers)
-        self._publishers, self._expected = publishers, _bounded(len(publishers))
-        if none_stays:
-            # Of a publisher that has taken the place of another, nothing is known but what it has sent since;
-            # and of that it is not known how much is the other's where they were level.
-            new = [each for each in self._sequences if not each.known]
-            gone -= len(self._sequences) - len(new) - sum(each.ahead for each in new)
-            self._sequences = new
-        surplus = max(0, len(self._sequences) - self._expected)
+        Args:
+            publishers: those that there are now.
+            again: whether to go through what has come since the last `collect` once more, as of all that
+                there were meanwhile.
+        """
+        if again:
+            self._expected = _bounded(len(publishers | self._publishers) + self._gone)
+            self._sequences = [replace(each) for each in self._before]
+            self._missing, self._restarts, self._aside = [], [], self._aside_before.copy()
+            for message in self._recent:
+                self._take(*message)
+        self._gone = min(self._gone + len(self._publishers - publishers), _MAX_GONE)
+        self._publishers, self._expected = publishers, _bounded(len(publishers) + self._gone)
         self._sequences.sort(key=lambda each: each.at_ns)
-        del self._sequences[:surplus]
-        # Which ones they are is not known: one that was kept may be of a publisher that has gone.
-        self._surplus = max(surplus, min(gone + self._surplus, len(self._sequences)))
+        del self._sequences[: max(0, len(self._sequences) - self._expected)]
+        for each in self._sequences:
+            each.heard = False
+
+    def _forget_what_has_gone(self) -> None:
+        """Forgets the sequences of publishers that have gone, once all that are there were heard since."""
+        heard = [each for each in self._sequences if each.heard]
+        if self._gone and len(heard) >= _bounded(len(self._publishers)):
+            self._sequences, self._gone = heard, 0
+        # One that has sent nothing has no sequence.
+        self._gone = min(self._gone, len(self._sequences))
+        self._expected = _bounded(len(self._publishers) + self._gone)
 
     def _set_aside(self, number: int, at_ns: int, published_ns: int) -> None:
         """Keeps a message that may be history, unless it was missing."""
         if not self._found(number, published_ns):
             self._aside.append((number, at_ns, published_ns))
 
-    def _advance(self, sequence: _Sequence, number: int, at_ns: int, published_ns: int) -> None:
-        """Takes a message for the newest of a sequence: the numbers before it are missing."""
-        if number > sequence.last + 1:
-            self._missing.append(
-                _Missing(
-                    sequence.last + 1, number - 1, sequence.at_ns, at_ns, sequence.published_ns, published_ns
-                )
-            )
-            self._bound()
-        sequence.last, sequence.at_ns, sequence.published_ns = number, at_ns, published_ns
+    def _nearest(
+        self, below: Sequence[_Sequence], number: int, published_ns: int
+    ) -> tuple[_Sequence | None, list[_Note]]:
+        """Returns the one of these that lacks the least up to a message, and what was set aside of that."""
+        nearest = max(below, key=lambda each: (each.last, _likeness(each, published_ns)), default=None)
+        if nearest is None or nearest.last == number - 1 or not self._aside:
+            return nearest, []
+        aside = sorted(each for each in self._aside if each[0] < number and each[2] <= published_ns)
+        ways = [
+            (each, list({note[0]: note for note in aside if _may_follow(each, *note)}.values()))
+            for each in below
+        ]
+        return max(ways, key=lambda way: (way[0].last + len(way[1]), _likeness(way[0], published_ns)))
+
+    def _next(self, sequence: _Sequence, between: list[_Note], note: _Note) -> None:
+        """Takes a message that nothing is missing before."""
+        sequence.heard = sequence.heard or self._settled
+        self._advance(sequence, *between, note)
+
+    def _advance(self, sequence: _Sequence, *notes: _Note) -> None:
+        """Takes messages for the newest of a sequence: the numbers between them are missing."""
+        for number, at_ns, published_ns in notes:
+            if number > sequence.last + 1:
+                times = sequence.at_ns, at_ns, sequence.published_ns, published_ns
+                self._missing.append(_Missing(sequence.last + 1, number - 1, *times))
+                self._bound()
+            sequence.last, sequence.at_ns, sequence.published_ns = number, at_ns, published_ns
 
     def _restart(self, number: int, at_ns: int, published_ns: int) -> None:
         """Takes a message that is lower than all, and not late: a publisher was started again."""
         oldest = min(self._sequences, key=lambda each: each.at_ns)
-        if self._surplus:
-            self._surplus -= 1  # Or it is one whose sequence was taken for that of a publisher that has gone.
-        elif len(self._restarts) < _MAX_RANGES:
+        if len(self._restarts) < _MAX_RANGES:
             self._restarts.append((oldest.at_ns, at_ns))
-        self._sequences.remove(oldest)
-        self._sequences.append(_Sequence(number, at_ns, published_ns))
+        oldest.last, oldest.at_ns, oldest.published_ns = number, at_ns, published_ns
+        oldest.heard = self._settled
 
     def _found(self, number: int, published_ns: int) -> bool:
         """Removes a message from the missing ones; returns whether it was one."""
@@ -255,6 +279,15 @@ class LossCounter:
 def _is_older(number: int, published_ns: int, sequence: _Sequence) -> bool:
     """Returns whether a message is from before the newest of a sequence, by number and by source time."""
     return number <= sequence.last and 0 < published_ns <= sequence.published_ns
+
+
+def _likeness(sequence: _Sequence, published_ns: int) -> tuple[bool, int, bool]:
+    """Returns what is greatest of the sequence whose next message it is, of those that a number fits equally.
+
+    It is the one whose source time is before the message's and the later one, because clocks may differ; then
+    the one that is heard, because the other may be of a publisher that has gone.
+    """
+    return sequence.published_ns <= published_ns, sequence.published_ns, sequence.heard
 
 
 def _may_follow(sequence: _Sequence, number: int, _at_ns: int, published_ns: int) -> bool:

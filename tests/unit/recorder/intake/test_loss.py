@@ -1,6 +1,7 @@
 """Counting what is missing by numbers, with nothing but numbers to go by."""
 
 from collections.abc import Hashable, Sequence
+from itertools import count
 from random import Random
 
 import pytest
@@ -364,6 +365,100 @@ def counted_and_lost(
 
 DROPPED = st.lists(st.booleans(), max_size=200)
 ORDER = st.randoms(use_true_random=False)
+
+
+@given(
+    steps=st.lists(st.sampled_from(["send", "send", "send", "send", "join", "leave", "look"]), max_size=60),
+    order=ORDER,
+    beginning=st.integers(1, 400),
+)
+def test_where_publishers_come_and_go_and_nothing_was_lost_nothing_is_counted(
+    steps: list[str], order: Random, beginning: int
+) -> None:
+    """The newest messages of one that leaves may come when the graph shows no longer that it was there."""
+    counter = LossCounter()
+    there = {0: beginning}
+    leaving: dict[int, int] = {}
+    names, clock = count(1), count(1)
+
+    def send(number: int) -> None:
+        counter.take(number, at := next(clock), at)
+
+    def look() -> None:
+        assert counter.collect(frozenset(there)) is None
+        for number in leaving.values():
+            for each in range(order.randrange(3)):
+                send(number + each)
+        leaving.clear()
+
+    look()
+    seen = set(there)
+    for step in steps:
+        if step == "join" and len(there) < 4:
+            there[next(names)] = 1
+        elif step == "leave" and there and (chosen := order.choice(sorted(there))) in seen:
+            leaving[chosen] = there.pop(chosen)
+        elif step == "look":
+            look()
+            seen |= set(there)
+        elif there:
+            chosen = order.choice(sorted(there))
+            send(there[chosen])
+            there[chosen] += 1
+    look()
+
+
+@given(lost=st.lists(st.booleans(), min_size=1, max_size=30), before=st.integers(1, 5), order=ORDER)
+def test_what_is_lost_of_those_that_stay_is_counted_once_they_were_heard(
+    lost: list[bool], before: int, order: Random
+) -> None:
+    counter = LossCounter()
+    counter.collect(frozenset({"a", "b", "gone"}))
+    newest = {"a": 10, "b": 1_000, "gone": 500}
+    at = 0
+
+    def send(publisher: str) -> None:
+        nonlocal at
+        at += 1
+        newest[publisher] += 1
+        counter.take(newest[publisher], at, at)
+
+    for publisher in [*newest] * before:
+        send(publisher)
+    there: frozenset[Hashable] = frozenset({"a", "b"})
+    assert counter.collect(there) is None
+    send("gone")
+    for _ in range(2):
+        assert counter.collect(there) is None
+        for publisher in ("a", "b"):
+            send(publisher)
+    assert counter.collect(there) is None
+    for each in lost:
+        publisher = order.choice(["a", "b"])
+        if each:
+            newest[publisher] += 1
+        else:
+            send(publisher)
+    for publisher in ("a", "b"):
+        send(publisher)
+    found = counter.collect(there)
+    assert (found.messages if found else 0) == sum(lost)
+    newest["a"] = 0
+    send("a")
+    found = counter.collect(there)
+    assert found, "started again unnoticed"
+    assert found.messages is None
+
+
+def test_what_has_gone_is_kept_in_bounds(counter: LossCounter) -> None:
+    """Beside one that is silent, so that not all were heard."""
+    counter.collect(frozenset({"silent", 0}))
+    counter.take(10_000, 0, 1)
+    for at in range(1, 400):
+        counter.take(3, at, at + 1)
+        assert counter.collect(frozenset({"silent", at})) is None
+    assert len(counter._sequences) <= 2 + loss._MAX_GONE
+    assert counter._expected <= 2 + loss._MAX_GONE
 
 
 @given(dropped=DROPPED, apart=st.permutations([1, 1_000, 20_000]), count=st.integers(1, 3), order=ORDER)
