@@ -16,6 +16,7 @@ without the graph showing another one: how far the former one had come is not kn
 from collections import deque
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Final
 
 _MAX_SEQUENCES: Final = 256
@@ -83,8 +84,8 @@ class LossCounter:
         self._restarts: list[tuple[int, int]] = []
         """Log times of the messages around each: nothing says how many are missing of the former one."""
         self._publishers: frozenset[Hashable] = frozenset()
-        self._gone = 0
-        """How many have gone whose sequences may still be there: which ones they are is not known."""
+        self._gone: frozenset[Hashable] = frozenset()
+        """Those that have gone, and whose sequences may still be there: which ones they are is not known."""
         self._settled = False
         """Whether none had come or gone at the last `collect`."""
         self._expected = 1
@@ -195,13 +196,13 @@ class LossCounter:
                 there were meanwhile.
         """
         if again:
-            self._expected = _bounded(len(publishers | self._publishers) + self._gone)
+            self._expected = _bounded(len(publishers | self._publishers | self._gone))
             self._sequences = [replace(each) for each in self._before]
             self._missing, self._restarts, self._aside = [], [], self._aside_before.copy()
             for message in self._recent:
                 self._take(*message)
-        self._gone = min(self._gone + len(self._publishers - publishers), _MAX_GONE)
-        self._publishers, self._expected = publishers, _bounded(len(publishers) + self._gone)
+        self._gone = frozenset(islice((self._gone | self._publishers) - publishers, _MAX_GONE))
+        self._publishers, self._expected = publishers, _bounded(len(publishers) + len(self._gone))
         self._sequences.sort(key=lambda each: each.at_ns)
         del self._sequences[: max(0, len(self._sequences) - self._expected)]
         for each in self._sequences:
@@ -211,10 +212,10 @@ class LossCounter:
         """Forgets the sequences of publishers that have gone, once all that are there were heard since."""
         heard = [each for each in self._sequences if each.heard]
         if self._gone and len(heard) >= _bounded(len(self._publishers)):
-            self._sequences, self._gone = heard, 0
+            self._sequences, self._gone = heard, frozenset()
         # One that has sent nothing has no sequence.
-        self._gone = min(self._gone, len(self._sequences))
-        self._expected = _bounded(len(self._publishers) + self._gone)
+        self._gone = frozenset(islice(self._gone, len(self._sequences)))
+        self._expected = _bounded(len(self._publishers) + len(self._gone))
 
     def _set_aside(self, number: int, at_ns: int, published_ns: int) -> None:
         """Keeps a message that may be history, unless it was missing."""

@@ -450,6 +450,17 @@ def test_what_is_lost_of_those_that_stay_is_counted_once_they_were_heard(
     assert found.messages is None
 
 
+def test_what_a_publisher_lost_while_the_graph_did_not_show_it_is_counted(counter: LossCounter) -> None:
+    """As where the network was cut for longer than the lease: it is the same one that is back."""
+    both: frozenset[Hashable] = frozenset({"a", "b"})
+    counter.collect(both)
+    take(counter, [1, 700, 2, 701])
+    for publishers in (both, ONE, ONE, both):
+        assert counter.collect(publishers) is None
+    take(counter, [3, 901])
+    assert lost(counter, both) == 199
+
+
 def test_what_has_gone_is_kept_in_bounds(counter: LossCounter) -> None:
     """Beside one that is silent, so that not all were heard."""
     counter.collect(frozenset({"silent", 0}))
