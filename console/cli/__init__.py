@@ -2,11 +2,14 @@
 
 import os
 
+from console.cli.lasting_imports import lasting_imports
+
 
 def main() -> None:
     """The command's entry. Ends with the exit codes of `common.errors.ExitCode`."""
     # gRPC's own log lines would break into tables; what they say is in our errors. Read once, at its import.
     os.environ.setdefault("GRPC_VERBOSITY", "NONE")
-    from console.cli.run import run  # noqa: PLC0415 - gRPC must not be imported before the line above
+    with lasting_imports():
+        from console.cli.run import run  # noqa: PLC0415 - gRPC must not be imported before the line above
 
     run()

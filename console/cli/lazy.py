@@ -8,6 +8,7 @@ from typer.core import TyperCommand
 from typer.main import get_command
 
 from common.command_line import read_plainly
+from console.cli.lasting_imports import lasting_imports
 
 
 def imported(place: str) -> Any:
@@ -31,7 +32,9 @@ class LazyCommand(TyperCommand):
 
     def make_context(self, *args: Any, **options: Any) -> Any:
         """Returns the context of the command itself (Click's protocol), which continues without this one."""
-        return self.load().make_context(*args, **options)
+        with lasting_imports():
+            command = self.load()
+        return command.make_context(*args, **options)
 
     def load(self) -> Any:
         """Imports and returns the command."""

@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,8 +14,11 @@ from tests.support.robotctl import ENDS_WITHIN_S, ROBOTCTL, environment
 
 ROOT = Path(__file__).parents[2]
 REPORTING = """
-import atexit, json, sys
-atexit.register(lambda: print(json.dumps(sorted(sys.modules)), file=sys.stderr))
+import atexit, gc, json, sys
+def report():
+    collector = [gc.isenabled(), gc.get_freeze_count(), len(gc.get_objects())]
+    print(json.dumps({"modules": sorted(sys.modules), "collector": collector}), file=sys.stderr)
+atexit.register(report)
 from console.cli import main
 main()
 """
@@ -24,8 +28,8 @@ FOR_CALLS = {"grpc", "google", "asyncio", "omniseer"}
 FOR_EDITS = {"tomlkit"}
 
 
-def imported_by(*words: str, **extra: str) -> set[str]:
-    """The packages that a command line has imported when it ends with 0."""
+def report_of(*words: str, **extra: str) -> Any:
+    """What a command line's process reports when it ends with 0."""
     ran = subprocess.run(
         [sys.executable, "-c", REPORTING, *words],
         cwd=ROOT,
@@ -36,8 +40,12 @@ def imported_by(*words: str, **extra: str) -> set[str]:
         check=False,
     )
     assert ran.returncode == 0, ran.stderr
-    modules = json.loads(ran.stderr.splitlines()[-1])
-    return {name.partition(".")[0] for name in modules}
+    return json.loads(ran.stderr.splitlines()[-1])
+
+
+def imported_by(*words: str, **extra: str) -> set[str]:
+    """The packages that a command line has imported when it ends with 0."""
+    return {name.partition(".")[0] for name in report_of(*words, **extra)["modules"]}
 
 
 def test_help_imports_neither_grpc_nor_rich() -> None:
@@ -55,6 +63,14 @@ def test_a_command_for_the_terminal_imports_nothing_for_windows(words: tuple[str
         imported = imported_by(*words, "--target", f"127.0.0.1:{port}")
     assert "grpc" in imported
     assert not imported & (WINDOWS | FOR_EDITS)
+
+
+@pytest.mark.parametrize("words", [("--help",), ("status", "--help"), ("status",)])
+def test_garbage_is_collected_but_not_looked_for_among_imports(words: tuple[str, ...]) -> None:
+    with serving(GatewayDouble()) as port:
+        collects, kept, others = report_of("--target", f"127.0.0.1:{port}", *words)["collector"]
+    assert collects
+    assert kept > others
 
 
 @pytest.mark.parametrize("name", list(COMMANDS))
