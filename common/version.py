@@ -7,7 +7,6 @@ revision names the exact commit (docs/decisions/0010-version-in-pyproject.md).
 import os
 import re
 from contextlib import suppress
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final
 
@@ -20,6 +19,9 @@ _REVISION: Final = re.compile(r"[0-9a-f]{40}")
 
 def project_version() -> str:
     """Returns MAJOR.MINOR.PATCH of the installed distribution; "0.0.0" if there is none."""
+    # The parser of e-mail comes with it, which most commands of robotctl would import for nothing.
+    from importlib.metadata import PackageNotFoundError, version  # noqa: PLC0415
+
     for distribution in _DISTRIBUTIONS:
         with suppress(PackageNotFoundError):
             return version(distribution)

@@ -26,6 +26,7 @@ WINDOWS = {"gi", "PySide6", "numpy", "pydantic", "rclpy", "sdl2"}
 FOR_TABLES = {"rich"}
 FOR_CALLS = {"grpc", "google", "asyncio", "omniseer"}
 FOR_EDITS = {"tomlkit"}
+FOR_VERSIONS = {"email"}
 
 
 def report_of(*words: str, **extra: str) -> Any:
@@ -58,11 +59,11 @@ def test_completion_imports_no_more_than_help() -> None:
 
 
 @pytest.mark.parametrize("words", [("status",), ("overlay",), ("preview", "on"), ("watch", "--count", "1")])
-def test_a_command_for_the_terminal_imports_nothing_for_windows(words: tuple[str, ...]) -> None:
+def test_a_command_for_the_terminal_imports_nothing_for_windows_or_versions(words: tuple[str, ...]) -> None:
     with serving(GatewayDouble()) as port:
         imported = imported_by(*words, "--target", f"127.0.0.1:{port}")
     assert "grpc" in imported
-    assert not imported & (WINDOWS | FOR_EDITS)
+    assert not imported & (WINDOWS | FOR_EDITS | FOR_VERSIONS)
 
 
 @pytest.mark.parametrize("words", [("--help",), ("status", "--help"), ("status",)])

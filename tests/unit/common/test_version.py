@@ -62,5 +62,5 @@ def test_the_version_is_that_of_whichever_distribution_is_installed(
         except KeyError:
             raise PackageNotFoundError(name) from None
 
-    monkeypatch.setattr("common.version.version", version)
+    monkeypatch.setattr("importlib.metadata.version", version)
     assert project_version() == expected
