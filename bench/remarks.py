@@ -14,8 +14,8 @@ REMARKS: Final[Mapping[tuple[str, ...], str]] = {
         " of, an empty Python program takes 64 to 67 ms."
     ),
     ("ros.value_latency_ms",): (
-        "a value waits up to 50 ms for the sampler (20 Hz) and up to 10 ms for the cached response. The bar"
-        " is the sum of the two and leaves nothing for the call itself."
+        "a value waits up to 50 ms for the sampler (20 Hz). The bar leaves 10 ms for the sampler's pass, the"
+        " call and the 2 ms between two calls."
     ),
     ("watch.p99_healthy", "status.p99"): (
         "callers and gateway share the cores of one machine. Where other programs take these, both rows rise"

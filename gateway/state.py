@@ -130,6 +130,11 @@ class State:
         """The preview at this instant; a new object whenever it changed."""
         return self._preview.view
 
+    @property
+    def ros_passed_s(self) -> float | None:
+        """When the newest pass of the ROS sampler ended, as `Board.ros_passed_s`."""
+        return self.board.ros_passed_s
+
     def snapshot(self) -> Snapshot:
         """Returns everything at this instant, from memory."""
         now_s = time.monotonic()

@@ -22,6 +22,10 @@ class StatusSource(SnapshotSource, Protocol):
     def preview(self) -> PreviewView:
         """The preview at this instant; a new object whenever it changed."""
 
+    @property
+    def ros_passed_s(self) -> float | None:
+        """When the newest pass of the ROS sampler ended, as `Board.ros_passed_s`."""
+
 
 class PictureSink(SnapshotSource, Protocol):
     """The same, where viewers' reports go as well."""

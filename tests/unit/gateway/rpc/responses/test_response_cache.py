@@ -14,10 +14,11 @@ ALICE, BOB = Recipient("10.0.0.1", sees_passphrase=False), Recipient("192.168.0.
 
 
 class World:
-    """A clock and a preview that the test moves; counts how often it was looked at."""
+    """A clock, a preview and a sampler that the test moves; counts how often it was looked at."""
 
     def __init__(self) -> None:
         self.now_s, self.taken = 100.0, 0
+        self.ros_passed_s: float | None = None
         self.preview = PreviewView(
             PreviewState.DISABLED,
             None,
@@ -62,6 +63,30 @@ def test_a_changed_preview_is_seen_at_once() -> None:
     assert status.preview.state == PREVIEW_RUNNING
     overlay = OverlaySnapshot.FromString(world.cache.response(overlay_snapshot, ALICE))
     assert overlay.status == status
+
+
+def test_what_the_sampler_has_read_is_seen_at_once() -> None:
+    world = World()
+    for passed_s in (100.0, 100.05):
+        world.ros_passed_s = passed_s
+        found = world.cache.response(system_status, ALICE)
+        assert world.cache.response(system_status, ALICE) is found
+    assert world.taken == 3, "at the start, and after each pass"
+
+
+def test_a_pass_that_ends_while_a_snapshot_is_taken_makes_another_one() -> None:
+    world = World()
+    plainly = world.snapshot
+
+    def passing() -> Snapshot:
+        taken = plainly()
+        world.ros_passed_s = 100.05
+        return taken
+
+    world.ros_passed_s, world.snapshot = 100.0, passing  # type: ignore[method-assign]
+    world.cache.response(system_status, ALICE)
+    world.cache.response(system_status, ALICE)
+    assert world.taken == 3
 
 
 def test_callers_from_different_networks_get_different_addresses() -> None:
