@@ -6,6 +6,7 @@ authentication.
 """
 
 import asyncio
+import gc
 import itertools
 import sys
 import time
@@ -105,6 +106,9 @@ async def _serve(unlimited: bool, credentials: Path | None) -> None:
     for number in range(8):
         gateway.events.note(_event(f"odometry received, for the {number}th time"))
     async with running(gateway, extra=[_reference(gateway)]) as port:
+        # As the program does (gateway/app.py).
+        gc.collect()
+        gc.freeze()
         print(port, flush=True)
         await asyncio.to_thread(sys.stdin.read)
 

@@ -112,3 +112,21 @@ def test_a_taken_port_ends_with_one_line_and_1(config: Path, tmp_path: Path) -> 
             first.terminate()
     assert second.returncode == 1
     assert "is taken by another program" in only_line(second.stderr)
+
+
+def test_no_collection_looks_at_what_lives_as_long_as_the_program(config: Path, tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    counts = "import atexit, gc; atexit.register(lambda: print(gc.get_freeze_count(), len(gc.get_objects())))"
+    command = [sys.executable, "-c", f"{counts}; {WITHOUT_ROS}", "serve", "--config", str(config)]
+    with (
+        log.open("w") as errors,
+        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True) as process,
+    ):
+        try:
+            wait_until(lambda: "serving operators" in log.read_text(), "the gateway serves")
+            process.terminate()
+            written, _ = process.communicate(timeout=10)
+        finally:
+            process.kill()
+    kept, others = map(int, written.split())
+    assert kept > others
