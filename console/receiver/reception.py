@@ -35,6 +35,9 @@ _REJOIN_AFTER_S: Final = 0.2
 """The same where none can be requested: a new connection begins with one."""
 _FIRST_KEY_FRAME_S: Final = 2.5
 """The same before a connection's first key frame: a sender may not send one at once, but each 2 s."""
+_REPAIR_S: Final = 0.2
+"""How long frames may be too old while packets behind them are there, and wait for those that come again: for
+what was lost when the link became narrower. A new connection would take as long, and cost a key frame."""
 _LEAST_WAIT_S: Final = 0.2
 _LONGEST_WAIT_S: Final = 0.6
 _FIRST_S: Final = 1.5
@@ -129,6 +132,8 @@ class Reception:
         self._reorder = Reorder(connection.first_number(), _LONGEST_WAIT_S)
         self._stream = TransportStream()
         self._age = AgeBound(options.max_age_s)
+        self._old_s: float | None = None
+        """Since when the frames that come are too old."""
         self._pts = Unwrapped()
         self._newest: AccessUnit | None = None
         self._behind = False
@@ -209,13 +214,18 @@ class Reception:
                     self._taken_s = time.monotonic()
 
     def _is_too_old(self, now_s: float) -> bool:
-        """Whether the newest access unit of those that have just come is too old."""
+        """Whether the newest access unit of those that have just come is too old, and repairs do not help."""
         unit, self._newest = self._newest, None
         if unit is None or unit.pts_ticks is None:
             return False
         time_s = ticks_to_ns(self._pts.ticks(unit.pts_ticks)) / _NS_PER_S
         age_s = self._options.capture.age_s(unit.pts_ticks) if self._options.capture else None
-        return self._age.exceeded(now_s, time_s, age_s)
+        if not self._age.exceeded(now_s, time_s, age_s):
+            self._old_s = None
+            return False
+        if self._old_s is None:
+            self._old_s = now_s
+        return not self._reorder.held or now_s - self._old_s >= _REPAIR_S
 
     def _is_stuck(self, now_s: float) -> bool:
         """Whether packets come, but for too long no frame that can be shown.

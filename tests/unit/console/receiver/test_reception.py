@@ -288,6 +288,31 @@ def test_the_age_of_the_frames_is_bounded(played: Played, clock: bool) -> None:
     assert played.now_s - 100.0 - newest_s == pytest.approx(1.0, abs=0.06)
 
 
+def repaired(played: Played, of_frames: range, after_s: float) -> None:
+    """Sends frames, of some of which the second payload comes so much later than the others."""
+    send(played, 60, lose=lambda frame, index: frame in of_frames and index == 1)
+    on_time = played.packets
+    played.packets = deque()
+    send(played, 60)
+    lost = [each for each in played.packets if each not in on_time]
+    again = [(arrival_s + after_s, number, payload) for arrival_s, number, payload in lost]
+    played.packets = deque(sorted([*on_time, *again]))
+
+
+def test_frames_that_are_old_because_something_was_lost_may_still_come(played: Played) -> None:
+    """Those of now are there already, and the last packet that is missing comes 0.1 s later."""
+    repaired(played, range(20, 24), after_s=0.4)
+    found = played.run(max_age_s=0.3)
+    assert played.shown == list(range(60))
+    assert (found.rejoins, found.given_up) == (0, 0)
+
+
+def test_frames_that_stay_old_because_of_losses_are_waited_for_no_longer(played: Played) -> None:
+    repaired(played, range(20, 60), after_s=0.4)
+    assert played.run(max_age_s=0.3).rejoins == 1
+    assert played.now_s == pytest.approx(100.0 + 20 / 30 + 0.4 + 0.2, abs=0.06)
+
+
 @pytest.mark.parametrize("clock", [True, False], ids=["by the robot's clock", "by what has grown"])
 def test_a_wrap_of_the_pts_is_no_age(played: Played, clock: bool) -> None:
     """It comes every 26.5 h."""
