@@ -138,7 +138,9 @@ class Hub:
         self._session: Session | None = None
         self._last_server = ""
         self._refusal = ""
-        """Of a server, in the present attempt at them all; empty: none refuses yet."""
+        """Of a server, in the present attempt at them all; empty: none refuses yet, or one has accepted."""
+        self._accepted = False
+        """Whether a server has accepted in the present attempt."""
         self._services: list[Service] = []
         self._calls: set[asyncio.Task[None]] = set()
         self._link = Link(False, "", None, "", asyncio.get_running_loop().time(), 0)
@@ -415,7 +417,7 @@ class Hub:
 
     async def _try_servers(self) -> Session | None:
         """Tries every server once, in random order, and the one that was lost last of all."""
-        self._refusal = ""
+        self._refusal, self._accepted = "", False
         servers = list(self._address.servers)
         random.shuffle(servers)
         # One that was lost because it is silent is silent to a new connection as well.
@@ -425,13 +427,12 @@ class Hub:
         except HubError as error:
             self._set(False, "", error)
             return None
-        self._refusal = ""
         return session
 
     async def _open_session(self, server: str) -> Session:
         address = self._address
         try:
-            return await Session.open(
+            session = await Session.open(
                 server,
                 credentials=address.credentials,
                 ca=address.ca,
@@ -440,8 +441,12 @@ class Hub:
                 not_taken=self.not_taken,
             )
         except RefusedError as error:
-            self._refusal = str(error)
+            if not self._accepted:
+                self._refusal = str(error)
             raise
+        # Before the other attempts have ended, which may take longer than a caller waits.
+        self._refusal, self._accepted = "", True
+        return session
 
     async def _use(self, session: Session) -> None:
         try:

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import asynccontextmanager
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -191,4 +192,31 @@ async def test_who_tries_once_does_not_wait_for_another_attempt(monkeypatch: pyt
     with pytest.raises(UnreachableError, match="a is off"):
         await hub.connected(_PATIENCE_S, once=True)
     assert asyncio.get_running_loop().time() == pytest.approx(0.0)
+    await cancel([task])
+
+
+@in_virtual_time
+async def test_no_refusal_is_reported_once_another_server_has_accepted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The end of the abandoned attempts may take longer than a caller waits."""
+
+    async def open_one(server: str, **_: Any) -> Any:
+        if server == "a":
+            raise RefusedError("no such account")
+        if server == "c":
+            await asyncio.sleep(1.5)
+            return SimpleNamespace(server="c", close=partial(asyncio.sleep, 0.0))
+        try:
+            await asyncio.sleep(3600.0)
+        finally:
+            await asyncio.sleep(10.0)  # it is slow to give up
+
+    monkeypatch.setattr("fleet.connection.Session", SimpleNamespace(open=open_one))
+    monkeypatch.setattr("fleet.connection.random.shuffle", lambda _servers: None)
+    hub = Hub(FleetAddress(("a", "b", "c")))
+    task = asyncio.create_task(hub.run())
+    with pytest.raises(HubError) as raised:
+        await hub.connected(_PATIENCE_S, once=True)
+    assert raised.value.reason is HubReason.UNREACHABLE
     await cancel([task])
