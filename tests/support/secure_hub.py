@@ -116,7 +116,7 @@ def secure_hub(directory: Path, nodes: int = 1, binary: Path | str = SERVER) -> 
         hub.servers.close()
 
 
-async def first_answer(hub: Hub) -> None:
+async def until_accepted(hub: Hub) -> None:
     """Returns when there is a connection. A server that gives up a client which stood still is tried again.
 
     Raises:
@@ -130,13 +130,21 @@ async def first_answer(hub: Hub) -> None:
     await hub.connected(0.0)
 
 
-def answer_to(address: FleetAddress) -> HubReason | None:
-    """Returns why there is no connection, UNREACHABLE also where nothing answers; None: there is one."""
+def answer_to(address: FleetAddress, *, once: bool = False) -> HubReason | None:
+    """Returns why there is no connection, UNREACHABLE also where nothing answers; None: there is one.
+
+    Args:
+        address: of the hub.
+        once: whether to try once, for a caller that measures: the pauses between attempts take seconds.
+    """
 
     async def answer() -> HubReason | None:
         async with connect(address) as hub:
             try:
-                await first_answer(hub)
+                if once:
+                    await hub.connected(_ANSWERS_WITHIN_S, once=True)
+                else:
+                    await until_accepted(hub)
             except HubError as error:
                 return error.reason
             return None

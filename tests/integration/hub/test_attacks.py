@@ -17,7 +17,7 @@ from hub import administration
 from tests.support.attacked_hub import connected, thiefs_session, unchanged
 from tests.support.hub_patience import in_the_end
 from tests.support.promise import keeps_async
-from tests.support.secure_hub import BOTH_SERVERS, SecureHub, first_answer, secure_hub
+from tests.support.secure_hub import BOTH_SERVERS, SecureHub, secure_hub, until_accepted
 
 _REVOKED_WITHIN_S = 5.0
 """docs/fleet.md."""
@@ -230,7 +230,7 @@ async def test_a_revoked_robot_is_out_and_stays_out(hub: SecureHub) -> None:
             assert b'"revoked": true' in (await administrator.entries(names.ROBOTS))[name].value
         async with connect(address) as again:
             with pytest.raises(RefusedError, match="does not accept the credentials"):
-                await first_answer(again)
+                await until_accepted(again)
         return needed_s
 
     await keeps_async(_REVOKED_WITHIN_S, "s until a revoked robot is out", out_s)
@@ -242,7 +242,7 @@ async def test_a_robot_enrolled_again_has_new_keys_and_the_old_ones_end(hub: Sec
     await administration.enroll(hub.directory, "d", hub.path / "d", again=True)
     async with connect(replace(old, credentials=kept)) as hub_of_old:
         with pytest.raises(RefusedError):
-            await first_answer(hub_of_old)
+            await until_accepted(hub_of_old)
     async with connected(old) as robot:
         await robot.publish_once("fleet.d.ev.run.1", b"")
 
@@ -252,7 +252,7 @@ async def test_expired_credentials_are_refused(hub: SecureHub) -> None:
     address = hub.address(hub.path / "e" / "bridge.creds", names.inbox_prefix("e"))
     async with connect(address) as robot:
         with pytest.raises(RefusedError):
-            await first_answer(robot)
+            await until_accepted(robot)
 
 
 async def test_a_server_without_tls_gets_no_credentials(thief: FleetAddress) -> None:

@@ -20,7 +20,7 @@ from hub.cli import app
 from hub.directory import HubDirectory
 from tests.support.free import free_tcp_port
 from tests.support.nats_servers import NatsServers
-from tests.support.secure_hub import first_answer
+from tests.support.secure_hub import until_accepted
 
 
 def _type(*words: str) -> Result:
@@ -225,7 +225,7 @@ def test_a_hub_that_is_off_is_reported(tmp_path: Path) -> None:
 
 async def _connected(address: FleetAddress) -> None:
     async with connect(address) as hub:
-        await first_answer(hub)
+        await until_accepted(hub)
 
 
 async def _listed(address: FleetAddress) -> dict[str, Entry]:

@@ -20,7 +20,7 @@ from hub.directory import ACCOUNTS_OF_PEOPLE, Kind, User
 from hub.server_config import with_accounts
 from hub.streams import stream_configs
 from tests.support.attacked_hub import connected
-from tests.support.secure_hub import BOTH_SERVERS, SecureHub, first_answer
+from tests.support.secure_hub import BOTH_SERVERS, SecureHub, until_accepted
 
 _SERVICES = (
     Service(names.EVENT_SUBJECTS),
@@ -95,7 +95,7 @@ async def test_apply_moves_people_and_receivers_and_loses_nothing(hub: SecureHub
         for address in (anna, receiver):
             async with connect(address) as again:
                 with pytest.raises(RefusedError):
-                    await first_answer(again)
+                    await until_accepted(again)
         # The robot notices nothing.
         assert await robot.publish_once("fleet.r1.ev.run.2", b"after") is Published.DELIVERED
         await robot.put(names.STATES, "r1", b"state")
@@ -169,7 +169,7 @@ def test_an_apply_that_did_not_reach_the_servers_is_repeated(hub: SecureHub) -> 
 async def _is_admitted(address: FleetAddress) -> bool:
     async with connect(address) as hub:
         try:
-            await first_answer(hub)
+            await until_accepted(hub)
         except RefusedError:
             return False
         return True

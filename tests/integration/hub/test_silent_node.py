@@ -102,7 +102,7 @@ def test_when_it_goes_on_it_learns_who_is_revoked(cluster: SecureHub) -> None:
         asyncio.run(administration.revoke(cluster.directory, "robot", name))
         cluster.servers.thaw(node)
         begun_s = time.monotonic()
-        refused = partial(answer_to, _at(cluster, robot, node))
+        refused = partial(answer_to, _at(cluster, robot, node), once=True)
         wait_until(lambda: refused() is HubReason.REFUSED, f"node {node} refuses it", 60.0)
         return time.monotonic() - begun_s
 
