@@ -12,7 +12,7 @@ THIS_MACHINE: Final = frozenset({"127.0.0.1", "::1", "localhost"})
 def exposed_server(servers: Iterable[str], ca: Path | None) -> str | None:
     """Returns a server that can't be used without an authority; None if there is none.
 
-    With an authority, connections are encrypted whatever the scheme (`fleet.session`). Without one, any
+    With an authority, connections are encrypted whatever the scheme (`fleet.nats_client`). Without one, any
     server could pass for one that is called tls://, and others may read and change what goes to another
     machine.
 

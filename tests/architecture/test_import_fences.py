@@ -77,7 +77,7 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
             for one in ("common", "gateway", "preview", "drive", "recorder", "simrobot", "tap")
         ),
         ("fleet/errors.py", ("asyncio", "fleet", *WIRE)),
-        ("fleet/identity.py", ("asyncio", "fleet.session", "fleet.connection", *WIRE)),
+        ("fleet/identity.py", ("asyncio", "fleet.nats_client", "fleet.session", "fleet.connection", *WIRE)),
         ("hub/permissions.py", ("asyncio", "fleet.connection", "hub")),
         ("hub/server_config.py", ("asyncio", "fleet", "hub")),
         # Practice is the console with the pure core of the drive program behind it. It opens no connection.
@@ -98,7 +98,7 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
             (f"fleet/{name}.py", ("nats", "nkeys", "asyncio"))
             for name in ("incoming", "names", "reading", "standing")
         ),
-        ("fleet/replies.py", ("nats", "nkeys", "fleet.session", "fleet.connection")),
+        ("fleet/replies.py", ("nats", "nkeys", "fleet.nats_client", "fleet.session", "fleet.connection")),
         ("bridge/", ("console.cli", "console.fleet", "console.monitor", "console.window", "console.viewer")),
         ("bridge/", HEAVY),
         ("hub/exporter/", ("hub.receiver", "hub.accounts", "hub.administration", "hub.creation", "boto3")),

@@ -21,7 +21,7 @@ from typing import Final
 
 _ROUNDS: Final = 50
 _EVERY_S: Final = 0.1
-"""What is killed may have started something meanwhile: it is looked again, until nothing is left."""
+"""What is killed may have started something meanwhile: so it looks again, for 5 s at most."""
 
 
 def start_reaper(name: str, value: str) -> None:
