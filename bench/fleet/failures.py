@@ -4,14 +4,16 @@ import asyncio
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench.fleet.cluster import NODES, cluster
 from bench.progress import log
 from bench.rows import FEWEST_ROUNDS, Row
 from fleet import names
+from fleet.connection import FleetAddress
 from tests.support.nats_servers import NatsServers
+from tests.support.secure_hub import secure_hub
 from tests.support.simulated_fleet import Fleet, Received, received, simulated_fleet
 
 ROBOTS = 1000
+NODES = 3
 KILLS = 5
 """The leader, a follower, and each of the three."""
 MESSAGES_PER_KILL = 4
@@ -29,7 +31,7 @@ class Round:
 
 def rows(workdir: Path, wanted: set[str]) -> list[Row]:
     rounds = [one_round(workdir / f"failures{number}", ROBOTS) for number in range(FEWEST_ROUNDS)]
-    during = f"{ROBOTS} robots x {MESSAGES} events, {KILLS} kills of nodes (kill -9)"
+    during = f"{ROBOTS} robots x {MESSAGES} events over TLS, {KILLS} kills of nodes (kill -9)"
     found = [
         Row(
             name=f"fleet.{name}",
@@ -59,15 +61,15 @@ def rows(workdir: Path, wanted: set[str]) -> list[Row]:
 
 
 def one_round(directory: Path, robots: int) -> Round:
-    with cluster(directory) as servers:
-        gap_s = asyncio.run(_send_and_kill(servers, robots))
-        arrived = asyncio.run(received(servers.urls, robots, MESSAGES))
+    with secure_hub(directory, NODES) as hub:
+        gap_s = asyncio.run(_send_and_kill(hub.servers, hub.all_robots(), robots))
+        arrived = asyncio.run(received(hub.administrator(), robots, MESSAGES))
     log(f"fleet: {arrived}, longest {gap_s:.1f} s")
     return Round(arrived, gap_s)
 
 
-async def _send_and_kill(servers: NatsServers, robots: int) -> float:
-    async with simulated_fleet(servers.urls, robots) as fleet:
+async def _send_and_kill(servers: NatsServers, address: FleetAddress, robots: int) -> float:
+    async with simulated_fleet(address, robots) as fleet:
         for kill in range(KILLS):
             first = kill * MESSAGES_PER_KILL
             async with asyncio.TaskGroup() as tasks:

@@ -10,10 +10,12 @@ from typing import Final
 
 import pytest
 
+from fleet import names
 from fleet.connection import FleetAddress, Hub, connect
 from fleet.errors import HubError, HubReason
+from fleet.identity import Permissions, new_user
 from fleet.names import inbox_prefix
-from hub import administration
+from hub import administration, permissions
 from hub.creation import HubPlan, create
 from hub.directory import HubDirectory
 from hub.server_config import Node, Places
@@ -62,6 +64,15 @@ class SecureHub:
         asyncio.run(in_the_end(enroll))
         return self.address(self.path / robot / "bridge.creds", inbox_prefix(robot))
 
+    def unlisted_robot(self, robot: str) -> FleetAddress:
+        """Issues a robot's credentials without enrolling it, which takes a while; returns how it connects."""
+        return self._of_robots(robot, permissions.robot(robot), inbox_prefix(robot))
+
+    def all_robots(self) -> FleetAddress:
+        """Returns how simulated robots connect that share a connection: it speaks for every robot."""
+        subjects = (names.EVENT_SUBJECTS, f"$KV.{names.STATES}.*")
+        return self._of_robots("all-robots", Permissions(subjects, (f"{names.INBOXES}.>",)), names.INBOXES)
+
     def operator(self, name: str, *, commands: bool = False) -> FleetAddress:
         """Issues credentials for a person; returns how they connect."""
         login = administration.operator_login(self.directory, name, commands=commands, days=None, again=False)
@@ -88,6 +99,12 @@ class SecureHub:
     def address(self, credentials: Path, inbox: str = "_INBOX") -> FleetAddress:
         """How to connect with these credentials."""
         return FleetAddress(self.servers.urls, credentials, self.directory.ca_file, inbox)
+
+    def _of_robots(self, name: str, allowed: Permissions, inbox: str) -> FleetAddress:
+        creds, _ = new_user(self.directory.key("robots"), name, allowed)
+        file = self.path / f"{name}.creds"
+        file.write_text(creds.text(), encoding="ascii")
+        return self.address(file, inbox)
 
     def _nodes(self) -> tuple[Node, ...]:
         ports = zip(self.servers.ports, self.servers.routes, self.servers.monitors, strict=True)

@@ -74,10 +74,10 @@ class Fleet:
 
 
 @asynccontextmanager
-async def simulated_fleet(servers: Sequence[str], count: int, batch: int = 1) -> AsyncGenerator[Fleet, None]:
-    """Robots that are connected, for a block."""
+async def simulated_fleet(address: FleetAddress, count: int, batch: int = 1) -> AsyncGenerator[Fleet, None]:
+    """Robots that are connected, for a block; the address speaks for all of them."""
     async with AsyncExitStack() as stack:
-        addresses = itertools.repeat(FleetAddress(tuple(servers)), CONNECTIONS)
+        addresses = itertools.repeat(address, CONNECTIONS)
         hubs = [await stack.enter_async_context(connect(address)) for address in addresses]
         for hub in hubs:
             await hub.connected(20)
@@ -106,10 +106,10 @@ class Received:
     disordered: int
 
 
-async def received(servers: Sequence[str], robots: int, messages: int) -> Received:
-    """Reads the stream of events and compares it with what the robots were to send."""
+async def received(address: FleetAddress, robots: int, messages: int) -> Received:
+    """Reads the stream of events, as the administration may, and compares it with what was to be sent."""
     sequences: dict[str, list[int]] = {}
-    async with connect(FleetAddress(tuple(servers))) as hub:
+    async with connect(address) as hub:
         await hub.connected(20)
         count = await _settled(hub, robots * messages)
         seen = 0

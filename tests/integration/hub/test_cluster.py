@@ -37,7 +37,7 @@ async def test_a_killed_leader_costs_no_event(tmp_path: Path) -> None:
     robots, messages = 100, 10
     with nats_servers(tmp_path, 3) as servers:
         await _set_up(servers, 3)
-        async with simulated_fleet(servers.urls, robots) as fleet, asyncio.TaskGroup() as tasks:
+        async with simulated_fleet(FleetAddress(servers.urls), robots) as fleet, asyncio.TaskGroup() as tasks:
             sending = tasks.create_task(fleet.send(range(messages)))
             await fleet.sent_at_least(robots * messages // 4)
             leader = servers.leader(names.EVENTS)
@@ -45,7 +45,7 @@ async def test_a_killed_leader_costs_no_event(tmp_path: Path) -> None:
             servers.kill(leader)
             await sending
             assert fleet.longest_s < _LONGEST_GAP_S
-        result = await received(servers.urls, robots, messages)
+        result = await received(FleetAddress(servers.urls), robots, messages)
     assert (result.lost, result.duplicates, result.disordered) == (0, 0, 0)
 
 
@@ -69,7 +69,7 @@ async def test_a_full_hub_refuses_and_loses_nothing(tmp_path: Path) -> None:
             await streams.set_up(hub, 1, streams.StreamLimits(events_bytes=MIB))
             subject = names.event_subject("r", "run", delivered)
             assert await hub.publish_once(subject, b"x" * 4096) is Published.DELIVERED
-        assert (await received(servers.urls, 1, delivered + 1)).lost == 0
+        assert (await received(FleetAddress(servers.urls), 1, delivered + 1)).lost == 0
 
 
 async def test_existing_streams_get_more_room_and_never_less(tmp_path: Path) -> None:
@@ -110,7 +110,7 @@ async def test_without_a_majority_nothing_is_acknowledged(tmp_path: Path) -> Non
             assert refused.value.reason in unsure
             servers.start((survivor + 1) % 3)
             await in_the_end(partial(hub.publish_once, "fleet.r.ev.run.0", b"", 2.0))
-        result = await received(servers.urls, 1, 1)
+        result = await received(FleetAddress(servers.urls), 1, 1)
     assert (result.lost, result.duplicates) == (0, 0), result
 
 
