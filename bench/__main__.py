@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from bench import catalogue, report, results
+from bench import catalogue, fleet_sizes, report, results
 from bench.catalogue import NAMES, Part
 from bench.progress import log
 from bench.results import Run
@@ -27,7 +27,7 @@ def main() -> int:
     parser = _parser()
     arguments = parser.parse_args()
     if arguments.page:
-        report.write_page(results.published())
+        _write_documents()
         return 0
     try:
         plan = catalogue.chosen(arguments.names)
@@ -65,8 +65,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--publish",
         action="store_true",
-        help="replace these rows in docs/benchmarks.json, and generate docs/benchmarks.md from it, as soon"
-        " as they are measured",
+        help="replace these rows in docs/benchmarks.json, and generate docs/benchmarks.md and the table of"
+        " sizes in docs/fleet.md from it, as soon as they are measured",
     )
     parser.add_argument(
         "--missing",
@@ -74,7 +74,7 @@ def _parser() -> argparse.ArgumentParser:
         help="leave out the rows that are published already, of this commit on this machine",
     )
     parser.add_argument(
-        "--page", action="store_true", help="only generate docs/benchmarks.md from docs/benchmarks.json"
+        "--page", action="store_true", help="only generate these documents from docs/benchmarks.json"
     )
     return parser
 
@@ -114,9 +114,16 @@ def _measure(plan: Mapping[Part, Sequence[str]], *, publish: bool) -> Run:
         run = run.with_newer(newer, NAMES)
         if publish and newer.rows:
             results.write(results.merged(results.published(), newer, NAMES))
-            # From the file, so that page and file can't differ in a rounded digit.
-            report.write_page(results.published())
+            _write_documents()
     return run
+
+
+def _write_documents() -> None:
+    """Generates what documents have of the published figures."""
+    # From the file, so that they and the file can't differ in a rounded digit.
+    published = results.published()
+    report.write_page(published)
+    fleet_sizes.write(published)
 
 
 if __name__ == "__main__":

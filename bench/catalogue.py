@@ -9,6 +9,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from bench.fleet_sizes import SIZES
 from bench.rows import Row
 
 
@@ -89,6 +90,7 @@ _STOPS: Final = tuple(
         "viewer_lossy",
     )
 )
+_HUB_SIZES: Final = tuple(f"fleet.hub_{robots}_{figure}" for robots in SIZES for figure in ("cpu", "mib"))
 
 PARTS: Final = (
     Part("bench.ros", 6, ("ros.intake", "ros.intake_newest", "ros.flat")),
@@ -160,7 +162,17 @@ PARTS: Final = (
     Part("bench.export.status", 2, ("export.status_p99", "export.status_p99_unlimited")),
     Part("bench.fleet.failures", 6, ("fleet.lost", "fleet.duplicates", "fleet.disordered", "fleet.gap_s")),
     Part("bench.fleet.rates", 2, ("fleet.events_s", "fleet.batched_events_s")),
-    Part("bench.fleet.cost", 2, ("fleet.robot_kib", "fleet.state_cpu_us")),
+    Part(
+        "bench.fleet.cost",
+        8,
+        (
+            "fleet.robot_kib",
+            "fleet.state_cpu_us",
+            "fleet.state_cpu_100_us",
+            "fleet.event_disk_bytes",
+            *_HUB_SIZES,
+        ),
+    ),
     Part("bench.fleet.uploading", 3, ("fleet.upload_resume_mib",)),
     Part(
         "bench.siege",

@@ -136,6 +136,21 @@ OLDER: Final = (
         " takes 0.2 ms a frame.",
     ),
     Older(
+        (
+            "fleet.lost",
+            "fleet.duplicates",
+            "fleet.disordered",
+            "fleet.gap_s",
+            "fleet.events_s",
+            "fleet.batched_events_s",
+            "fleet.robot_kib",
+            "fleet.state_cpu_us",
+        ),
+        frozenset({"dde4d43c"}),
+        "measured with a hub without TLS and accounts, and `fleet.state_cpu_us` against 100 robots that send"
+        " a tenth of the states. Now the hub is as `robot-bridge hub init` makes it.",
+    ),
+    Older(
         ("drive.stop_viewer_ms", "drive.stop_viewer_lossy_ms"),
         frozenset({"648d6af8"}),
         "measured on a robot at rest, by a gateway that asks for no login. Since then the robot is driven"

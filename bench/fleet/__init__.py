@@ -1,4 +1,4 @@
-"""The fleet's hub: three real nodes on this machine, every message synced before it is acknowledged."""
+"""The fleet's hub: real nodes on this machine, with TLS and accounts, each message synced."""
 
 import tempfile
 from collections.abc import Collection

@@ -1,97 +1,225 @@
-"""What one more robot costs a server: memory of its connection, and CPU time of its states.
+"""What a fleet costs a server of the hub: CPU time, memory and disk, with 10, 100 and 1000 robots.
 
-With 1000 robots against 100: flat means that a robot of a large fleet costs what one of a small fleet does.
+Each robot has a connection of its own, with TLS and its own credentials, as a bridge has. Two loads:
+
+- as robots send: a state a second, and an event a minute each. This is what docs/fleet.md has by size;
+- 1000 states a second whatever the number of robots: what one costs is compared, and a server that wakes up
+  for a few messages a second needs more CPU time for each of them, however few robots there are.
 """
 
 import asyncio
-from collections import Counter
-from contextlib import AsyncExitStack
-from dataclasses import dataclass
+from collections.abc import AsyncGenerator, Awaitable, Callable
+from contextlib import AsyncExitStack, asynccontextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Final
 
-from bench.fleet.cluster import cluster
+from bench.fleet_sizes import EVENT_BYTES, EVENT_EVERY_S, SIZES
 from bench.processes import cpu_seconds, resident_mib
 from bench.progress import log
 from bench.rows import FEWEST_ROUNDS, Row
 from fleet import names
 from fleet.connection import FleetAddress, Hub, connect
+from tests.support.secure_hub import SecureHub, secure_hub
 
-FEW, MANY = 100, 1000
-WINDOW_S = 5.0
-PERIOD_S = 1.0
-BAR = 1.5
+FEWEST, FEW, MANY = SIZES
+WINDOW_S: Final = 5.0
+BAR: Final = 1.5
+_STATE: Final = b"x" * 400
+_STATES_S: Final = 1000.0
+"""Of all robots together, under the second load."""
+_AT_ONCE: Final = 20
+"""Robots that connect at the same time: more would not be through with TLS within its time-out."""
+_EVENTS: Final = 5
+"""Of each robot, to see what they take on the disk."""
+_ANSWER_S: Final = 10.0
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Of one robot."""
+    """Of a fleet of one size.
 
+    Attributes:
+        cpu_percent: of a core, with a state a second and an event a minute from each robot.
+        mib: resident memory of the server meanwhile.
+        kib: of it, what each robot has added.
+        state_us: CPU time for each of 1000 states a second.
+        event_bytes: on the disk for each event.
+    """
+
+    cpu_percent: float
+    mib: float
     kib: float
     state_us: float
-    """CPU time for each of its states: how many there are depends on how busy this machine is."""
+    event_bytes: float
 
 
 def rows(workdir: Path, wanted: set[str]) -> list[Row]:
-    few, many = [], []
+    costs: dict[int, list[Cost]] = {robots: [] for robots in SIZES}
     for number in range(FEWEST_ROUNDS):
-        few.append(one_round(workdir / f"few{number}", FEW))
-        many.append(one_round(workdir / f"many{number}", MANY))
-        log(f"fleet: {few[-1]}, {many[-1]}")
-    against = f"with {MANY} robots, against {FEW}, each with a connection of its own and a state a second"
-    found = [
-        Row(
-            name="fleet.robot_kib",
-            what=f"memory of the server for each robot: {against}",
-            unit="KiB",
-            values=[each.kib for each in many],
-            references=[each.kib for each in few],
-            bar=BAR,
-        ),
-        Row(
-            name="fleet.state_cpu_us",
-            what=f"CPU time of the server for each state: {against}",
-            unit="us",
-            values=[each.state_us for each in many],
-            references=[each.state_us for each in few],
-            bar=BAR,
-        ),
-    ]
-    return [row for row in found if row.name in wanted]
+        for robots in SIZES:
+            costs[robots].append(one_round(workdir / f"{robots}-{number}", robots))
+            log(f"fleet: {robots} robots: {costs[robots][-1]}")
+    return [row for row in (*_promised(costs), *_by_size(costs)) if row.name in wanted]
 
 
 def one_round(directory: Path, robots: int) -> Cost:
-    with cluster(directory, nodes=1) as servers:
-        process = servers.processes[0]
-        if process is None:
-            raise RuntimeError("the server does not run")
-        return asyncio.run(_cost(servers.urls, process.pid, robots))
+    with secure_hub(directory) as hub:
+        return asyncio.run(_cost(hub, robots))
 
 
-async def _cost(servers: tuple[str, ...], pid: int, robots: int) -> Cost:
-    empty_mib = resident_mib(pid)
-    async with AsyncExitStack() as stack:
-        hubs = [await stack.enter_async_context(connect(FleetAddress(servers))) for _ in range(robots)]
-        for hub in hubs:
-            await hub.connected(60)
+def _promised(costs: dict[int, list[Cost]]) -> list[Row]:
+    own = "each robot over TLS with a connection and credentials of its own"
+    states = [
+        Row(
+            name=name,
+            what=f"CPU time of the server for each of {_STATES_S:.0f} states a second, from {robots} robots,"
+            f" against {FEWEST} that send as many, {own}",
+            unit="us",
+            values=[each.state_us for each in costs[robots]],
+            references=[each.state_us for each in costs[FEWEST]],
+            bar=BAR,
+        )
+        for name, robots in (("fleet.state_cpu_us", MANY), (f"fleet.state_cpu_{FEW}_us", FEW))
+    ]
+    memory = Row(
+        name="fleet.robot_kib",
+        what=f"memory of the server for each robot, with {MANY} robots, against {FEW}, {own}",
+        unit="KiB",
+        values=[each.kib for each in costs[MANY]],
+        references=[each.kib for each in costs[FEW]],
+        bar=BAR,
+    )
+    return [memory, *states]
+
+
+def _by_size(costs: dict[int, list[Cost]]) -> list[Row]:
+    load = "robots over TLS, with a state a second and an event a minute each, one node"
+    found = [
+        Row(
+            name="fleet.event_disk_bytes",
+            what=f"what the server's disk needs for an event of {EVENT_BYTES} bytes, one in a message",
+            unit="bytes",
+            values=[each.event_bytes for each in costs[MANY]],
+            bar=None,
+        )
+    ]
+    for robots in SIZES:
+        found += [
+            Row(
+                name=f"fleet.hub_{robots}_cpu",
+                what=f"CPU of the server: {robots} {load}",
+                unit="% of a core",
+                values=[each.cpu_percent for each in costs[robots]],
+                bar=None,
+            ),
+            Row(
+                name=f"fleet.hub_{robots}_mib",
+                what=f"resident memory of the server: {robots} {load}",
+                unit="MiB",
+                values=[each.mib for each in costs[robots]],
+                bar=None,
+            ),
+        ]
+    return found
+
+
+@dataclass
+class _Load:
+    """Robots that send. Attributes: `states`, those that the hub has taken."""
+
+    hubs: list[Hub]
+    states: int = 0
+    _events: dict[int, int] = field(default_factory=dict)
+
+    async def state(self, robot: int) -> None:
+        """Sends a robot's state."""
+        await self.hubs[robot].put(names.STATES, _name(robot), _STATE, _ANSWER_S)
+        self.states += 1
+
+    async def event(self, robot: int) -> None:
+        """Sends a robot's next event."""
+        number = self._events[robot] = self._events.get(robot, 0) + 1
+        subject = names.event_subject(_name(robot), "run", number)
+        await self.hubs[robot].publish_once(subject, b"x" * EVENT_BYTES, _ANSWER_S)
+
+    @asynccontextmanager
+    async def each(self, period_s: float, send: Callable[[int], Awaitable[None]]) -> AsyncGenerator[None]:
+        """Has each robot send once in a period, for a block; the robots are spread evenly over it."""
         async with asyncio.TaskGroup() as tasks:
-            states: Counter[str] = Counter()
-            reporting = [
-                tasks.create_task(_report(hub, f"r{number}", states)) for number, hub in enumerate(hubs)
+            count = len(self.hubs)
+            senders = [
+                tasks.create_task(_at_each(period_s, period_s * robot / count, send, robot))
+                for robot in range(count)
             ]
-            await asyncio.sleep(PERIOD_S)  # every robot has reported once
-            before_s, first = cpu_seconds(pid), states.total()
-            await asyncio.sleep(WINDOW_S)
-            cpu_s, count = cpu_seconds(pid) - before_s, states.total() - first
-            full_mib = resident_mib(pid)
-            for each in reporting:
-                each.cancel()
-    return Cost((full_mib - empty_mib) * 1024 / robots, 1e6 * cpu_s / count)
+            yield
+            for sender in senders:
+                sender.cancel()
 
 
-async def _report(hub: Hub, robot: str, states: Counter[str]) -> None:
-    """A state a second, at an instant of the robot's own."""
-    await asyncio.sleep(hash(robot) % 1000 / 1000 * PERIOD_S)
+async def _at_each(
+    period_s: float, first_s: float, send: Callable[[int], Awaitable[None]], robot: int
+) -> None:
+    clock = asyncio.get_running_loop().time
+    due_s = clock() + first_s
     while True:
-        await hub.put(names.STATES, robot, b"x" * 400, 10)
-        states[robot] += 1
-        await asyncio.sleep(PERIOD_S)
+        await asyncio.sleep(due_s - clock())
+        await send(robot)
+        due_s = max(due_s + period_s, clock())
+
+
+async def _cost(hub: SecureHub, robots: int) -> Cost:
+    process = hub.servers.processes[0]
+    if process is None:
+        raise RuntimeError("the server does not run")
+    pid, empty_mib = process.pid, resident_mib(process.pid)
+    async with AsyncExitStack() as stack:
+        load = _Load(await _connected(stack, [hub.unlisted_robot(_name(each)) for each in range(robots)]))
+        async with load.each(1.0, load.state), load.each(EVENT_EVERY_S, load.event):
+            cpu_s, _ = await _window(pid, load)
+            mib = resident_mib(pid)
+        async with load.each(robots / _STATES_S, load.state):
+            states_s, states = await _window(pid, load)
+        before = _disk_bytes(hub)
+        async with asyncio.TaskGroup() as tasks:
+            for robot in range(robots):
+                tasks.create_task(_events(load, robot))
+        event_bytes = (_disk_bytes(hub) - before) / (robots * _EVENTS)
+    return Cost(
+        100 * cpu_s / WINDOW_S, mib, (mib - empty_mib) * 1024 / robots, 1e6 * states_s / states, event_bytes
+    )
+
+
+async def _connected(stack: AsyncExitStack, addresses: list[FleetAddress]) -> list[Hub]:
+    hubs: list[Hub] = []
+    for first in range(0, len(addresses), _AT_ONCE):
+        some = [
+            await stack.enter_async_context(connect(each)) for each in addresses[first : first + _AT_ONCE]
+        ]
+        for hub in some:
+            await hub.connected(60)
+        hubs += some
+    return hubs
+
+
+async def _window(pid: int, load: _Load) -> tuple[float, int]:
+    """Returns the CPU time of the server in a window, in s, and the states that it has taken meanwhile."""
+    await asyncio.sleep(1.0)  # every robot has sent once
+    before_s, first = cpu_seconds(pid), load.states
+    await asyncio.sleep(WINDOW_S)
+    return cpu_seconds(pid) - before_s, load.states - first
+
+
+async def _events(load: _Load, robot: int) -> None:
+    for _ in range(_EVENTS):
+        await load.event(robot)
+
+
+def _disk_bytes(hub: SecureHub) -> int:
+    """Returns the size of the events' blocks, which is what grows with their number."""
+    blocks = hub.servers.directory.rglob(f"streams/{names.EVENTS}/msgs/*.blk")
+    return sum(each.stat().st_size for each in blocks)
+
+
+def _name(robot: int) -> str:
+    return f"r{robot}"

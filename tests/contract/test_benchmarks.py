@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from bench import fleet_sizes
 from bench.catalogue import GROUPS, NAMES
 from bench.remarks import OLDER, REMARKS
 from bench.report import PAGE, page
@@ -19,6 +20,13 @@ ROWS = [row for run in published() for row in run.rows]
 def test_the_page_is_generated_from_the_figures() -> None:
     assert RESULTS.exists()
     assert PAGE.read_text(encoding="utf-8") == page(published()), "scripts/bench --page generates it"
+
+
+def test_the_table_of_sizes_is_generated_from_the_figures() -> None:
+    made = fleet_sizes.table(published())
+    # Where its rows are not published yet, the document says so.
+    assert made is None or fleet_sizes.written() == made, "scripts/bench --page generates it"
+    assert (made is None) == ("Until these sizes are measured" in fleet_sizes.written())
 
 
 def test_every_published_row_exists_once() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from bench import __main__ as program
-from bench import report, results
+from bench import fleet_sizes, report, results
 from bench.catalogue import Part
 from bench.results import Conditions
 from bench.rows import Row
@@ -34,6 +34,7 @@ class Bench:
         self.before: Callable[[], None] = lambda: None
         self.json = directory / "benchmarks.json"
         self.page = directory / "benchmarks.md"
+        self.document = directory / "fleet.md"
 
     def measured(self, _part: Part, names: Sequence[str]) -> list[Row]:
         self.asked.append(tuple(names))
@@ -65,6 +66,7 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
         (results, "published", made.json),
         (results, "write", made.json),
         (report, "write_page", made.page),
+        (fleet_sizes, "write", made.document),
     ):
         monkeypatch.setattr(module, name, partial(getattr(module, name), file=file))
     return made
