@@ -90,6 +90,11 @@ _STOPS: Final = tuple(
         "viewer_lossy",
     )
 )
+_BRIDGE: Final = tuple(
+    f"fleet.bridge{uploads}_{figure}"
+    for uploads in ("", "_without_uploads")
+    for figure in ("cpu", "mib", "cpu_against_bare", "mib_against_bare")
+)
 _HUB_SIZES: Final = tuple(f"fleet.hub_{robots}_{figure}" for robots in SIZES for figure in ("cpu", "mib"))
 
 PARTS: Final = (
@@ -173,6 +178,7 @@ PARTS: Final = (
             *_HUB_SIZES,
         ),
     ),
+    Part("bench.fleet.bridge", 11, _BRIDGE),
     Part("bench.fleet.uploading", 3, ("fleet.upload_resume_mib",)),
     Part(
         "bench.siege",

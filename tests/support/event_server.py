@@ -1,4 +1,7 @@
-"""The gateway's streams of events and status on a port of their own: things happen when a test says so."""
+"""The gateway's streams of events and status on a port of their own: things happen when a test says so.
+
+It has a list of recordings, too, which ended long ago.
+"""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -15,6 +18,7 @@ from gateway.rpc.responses.event_stream import EventStream
 from gateway.status.event import Event, ModeChanged
 from gateway.status.event_log import EventLog
 from gateway.status.fault import Severity
+from omniseer.gateway.v1 import recording_pb2
 from omniseer.gateway.v1.robot_gateway_pb2 import (
     SubscribeEventsRequest,
     WatchSystemStatusRequest,
@@ -32,10 +36,14 @@ class EventServer:
 
     Args:
         kept: how many events each run remembers.
+        recordings: how many it lists.
+        name: of its runs, to which a number is added.
     """
 
-    def __init__(self, kept: int) -> None:
+    def __init__(self, kept: int, recordings: int = 0, name: str = "run") -> None:
+        self._name = name
         self._kept = kept
+        self._recordings = recordings
         self._runs = 0
         self.port = free_tcp_port()
         self.happened: dict[str, int] = {}
@@ -81,7 +89,7 @@ class EventServer:
 
     async def _start(self) -> None:
         self._runs += 1
-        self._log = EventLog(f"run-{self._runs}", self._kept)
+        self._log = EventLog(f"{self._name}-{self._runs}", self._kept)
         self._appended = Broadcast()
         stream = EventStream(self._log, self._appended)
 
@@ -99,10 +107,40 @@ class EventServer:
         }
         self._server = new_server()
         self._server.add_generic_rpc_handlers(
-            (grpc.method_handlers_generic_handler("omniseer.gateway.v1.RobotGateway", handlers),)
+            (
+                grpc.method_handlers_generic_handler("omniseer.gateway.v1.RobotGateway", handlers),
+                grpc.method_handlers_generic_handler(
+                    "omniseer.gateway.v1.RecordingService",
+                    {
+                        "ListRecordings": grpc.unary_unary_rpc_method_handler(
+                            self._list,
+                            recording_pb2.ListRecordingsRequest.FromString,
+                            recording_pb2.ListRecordingsResponse.SerializeToString,
+                        )
+                    },
+                ),
+            )
         )
         self.port = await _bound(self._server, self.port)
         await self._server.start()
+
+    async def _list(
+        self, _request: recording_pb2.ListRecordingsRequest, _context: Any
+    ) -> recording_pb2.ListRecordingsResponse:
+        return recording_pb2.ListRecordingsResponse(
+            recordings=[
+                recording_pb2.Recording(
+                    id=f"recording-{number}",
+                    kind=recording_pb2.RECORDING_KIND_MANUAL,
+                    state=recording_pb2.RECORDING_STATE_COMPLETE,
+                    started_unix_ms=1,
+                    ended_unix_ms=2,
+                    size=1000,
+                    file_count=1,
+                )
+                for number in range(self._recordings)
+            ]
+        )
 
     async def _watch(self, _request: Any, _context: Any) -> AsyncIterator[WatchSystemStatusResponse]:
         async for _ in self._status_changed.now_and_on_change(lambda: _STATUS_EVERY_S):
