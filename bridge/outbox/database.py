@@ -98,17 +98,21 @@ class Database:
         except sqlite3.Error as error:
             _log.warning("%s can't be closed: %s", self._path, error)
 
-    def append(self, items: Sequence[Item], position: Position) -> None:
+    def append(self, items: Sequence[Item], after: Position | None, position: Position) -> None:
         """Adds items; they are on the disk when this returns. Drops others if there is no room.
 
         Args:
-            items: what follows the last one, without a hole; no more than 256 KiB.
+            items: what follows `after`, without a hole; no more than 256 KiB.
+            after: the position that the database had, as far as its caller knows.
             position: after the last of them.
 
         Raises:
-            OutboxError: nothing was changed.
+            OutboxError: nothing was changed. So it is where the database was made anew meanwhile, and has
+                another position: what the lost one had would be missing without a gap.
         """
         with self._use() as db:
+            if (here := _position(db)) != after:
+                raise OutboxError(f"{self._path} was made anew, and begins {_where(here)}")
             for item in items:
                 insert(db, item)
                 meta.count(db, "events", isinstance(item, Event))
@@ -370,14 +374,23 @@ class Database:
         return batch_between(db, self._cursor.first_id, self._flight)
 
     def _read_facts(self, db: sqlite3.Connection) -> Facts:
-        run_id = meta.get(db, "run_id")
         return Facts(
             events=meta.get(db, "events") or 0,
             size=_pages(db) * _PAGE_BYTES,
             sent=meta.get(db, "sent") or 0,
             dropped=meta.get(db, "dropped") or 0,
-            position=None if run_id is None else Position(run_id, meta.get(db, "sequence")),
+            position=_position(db),
         )
+
+
+def _position(db: sqlite3.Connection) -> Position | None:
+    """Returns the position after the last event that was taken; None in a new outbox."""
+    run_id = meta.get(db, "run_id")
+    return None if run_id is None else Position(run_id, meta.get(db, "sequence"))
+
+
+def _where(position: Position | None) -> str:
+    return "with what happens now" if position is None else f"after event {position.sequence}"
 
 
 def _pages(db: sqlite3.Connection) -> int:

@@ -50,9 +50,9 @@ class Outbox:
         """Returns whether the outbox before this one was lost, and nothing was added since."""
         return await self._call(self._database.is_new)
 
-    async def append(self, items: Sequence[Item], position: Position) -> None:
+    async def append(self, items: Sequence[Item], after: Position | None, position: Position) -> None:
         """Adds items; see `Database.append`."""
-        await self._call(self._database.append, items, position)
+        await self._call(self._database.append, items, after, position)
 
     async def next_batch(self) -> Batch | None:
         """Returns what is to be sent; see `Database.next_batch`."""

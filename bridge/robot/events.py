@@ -62,11 +62,11 @@ class EventReader:
         feed = Feed(position, MOST_PROBES)
         async with events(self._settings, position) as responses:
             while True:
-                reason = self._reason(lost=lost)
+                reason, before = self._reason(lost=lost), feed.position
                 items = await _next_items(responses, feed, reason)
                 backoff.reset()
                 if items and feed.position:
-                    await self._outbox.append(items, feed.position)
+                    await self._outbox.append(items, before, feed.position)
                     lost = False
                 self._disk_failed = False
 

@@ -20,8 +20,10 @@ _DELIVERED_EVERY: Final = 100
 def main(directory: Path, first: int) -> None:
     """Takes events until the process is killed."""
     database = Database(directory, MAX_BYTES)
+    database.open()
     for sequence in range(first, first + _MOST):
-        database.append([Event(RUN, sequence, 1, b"%d" % sequence)], Position(RUN, sequence))
+        event = Event(RUN, sequence, 1, b"%d" % sequence)
+        database.append([event], database.facts.position, Position(RUN, sequence))
         print(sequence, flush=True)
         if sequence % _DELIVERED_EVERY == 0 and (batch := database.next_batch()):
             database.delivered(batch, repeated=False)

@@ -23,7 +23,8 @@ def event(sequence: int, severity: int = 1, size: int = 20, run_id: str = RUN) -
 
 
 def add(database: Database, *items: Item) -> None:
-    database.append(items, Position(items[-1].run_id, items[-1].last))
+    database.open()
+    database.append(items, database.facts.position, Position(items[-1].run_id, items[-1].last))
 
 
 def taken(database: Database) -> list[Item]:

@@ -55,7 +55,7 @@ class OutboxMachine(RuleBasedStateMachine):
             self.sequence += 1
             self.waiting.append(Place(self.run_id, self.sequence, severity))
             items.append(Event(self.run_id, self.sequence, severity, b"%d" % self.sequence))
-        self.database.append(items, Position(self.run_id, self.sequence))
+        self.database.append(items, self.database.facts.position, Position(self.run_id, self.sequence))
 
     @rule(missing=st.integers(0, 5))
     def restart_the_gateway(self, missing: int) -> None:
@@ -63,7 +63,7 @@ class OutboxMachine(RuleBasedStateMachine):
         gap = Gap(self.run_id, 1, missing, DropReason.NO_LONGER_KEPT, earlier=True)
         self.waiting.append(Place(self.run_id, 0, 0, there=False))
         self.waiting += [Place(self.run_id, each, 0, there=False) for each in range(1, missing + 1)]
-        self.database.append([gap], Position(self.run_id, missing))
+        self.database.append([gap], self.database.facts.position, Position(self.run_id, missing))
 
     @precondition(lambda self: any(each.there for each in self.waiting[self.flight :]))
     @rule(count=st.integers(1, 20))

@@ -80,7 +80,7 @@ def test_the_smallest_outbox_has_room_for_events_beside_the_queue(tmp_path: Path
             db.execute("INSERT INTO uploads VALUES (?, ?)", (name, row))
     for first in range(1, 1001, 100):
         events = [Event("run", number, 1, b"x" * 1000) for number in range(first, first + 100)]
-        database.append(events, Position("run", first + 99))
+        database.append(events, database.facts.position, Position("run", first + 99))
     assert database.facts.events == 1000
     assert database.facts.dropped == 0
     database.close()

@@ -67,7 +67,7 @@ async def test_an_outbox_that_has_more_rows_than_it_remembers_is_emptied_at_the_
         assert sum(each.state is State.VERIFIED for each in kept) == most
         assert any(each.recording_id == "w" for each in kept)
         events = [Event("run", number, 1, b"x" * 1000) for number in range(1, 101)]
-        await small.append(events, Position("run", 100))
+        await small.append(events, None, Position("run", 100))
         assert (small.facts.events, small.facts.dropped) == (100, 0)
 
 
