@@ -2,13 +2,24 @@
 
 from typing import Final
 
+from google.protobuf.message import DecodeError
+
 from bridge.values import Batch, Event, Gap, Item
 from omniseer.fleet.v1 import event_pb2 as pb
 from omniseer.gateway.v1 import event_pb2, fault_pb2
 
 
+def is_whole(event: Event) -> bool:
+    """Returns whether an event's payload is still that of this event: a bad disk may have changed it."""
+    try:
+        message = event_pb2.Event.FromString(event.payload)
+    except DecodeError:
+        return False
+    return (message.run_id, message.sequence) == (event.run_id, event.sequence)
+
+
 def batch_message(robot: str, batch: Batch) -> bytes:
-    """Returns an EventBatch. The same batch always has the same bytes."""
+    """Returns an EventBatch, of events that are whole. The same batch always has the same bytes."""
     message = pb.EventBatch(
         robot=robot,
         run_id=batch.run_id,

@@ -4,6 +4,8 @@
 |---|---|
 | delivered, or refused because it has the batch | the outbox deletes it |
 | anything else, or nothing | the same again: after 1 s to 60 s with jitter, or over the next connection |
+
+An event that the disk has changed is sent as a gap.
 """
 
 import asyncio
@@ -11,10 +13,10 @@ import logging
 import time
 from collections.abc import Awaitable, Callable
 
-from bridge.encoding import batch_message
+from bridge.encoding import batch_message, is_whole
 from bridge.jittered_backoff import JitteredBackoff
 from bridge.outbox.outbox import Outbox
-from bridge.values import OutboxError
+from bridge.values import Event, OutboxError
 from fleet.connection import Hub, Published
 from fleet.errors import HubError
 from fleet.names import event_subject, result_subject
@@ -83,6 +85,11 @@ class Sender:
         if batch is None:
             self.error = ""
             return False
+        if changed := [each for each in batch.items if isinstance(each, Event) and not is_whole(each)]:
+            numbers = [each.sequence for each in changed]
+            _log.error("events of run %s that the disk has changed become gaps: %s", batch.run_id, numbers)
+            await self._outbox.give_up(batch, numbers)
+            return True
         subject = event_subject(self._robot, batch.run_id, batch.first)
         published = await self._hub.publish_once(subject, batch_message(self._robot, batch))
         self.last_sent_s = time.monotonic()

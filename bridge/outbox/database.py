@@ -15,7 +15,7 @@ from typing import Final
 
 from bridge.outbox import commands, meta
 from bridge.outbox.cursor import Cursor, read_cursor, write_cursor
-from bridge.outbox.items import batch_between, drop_oldest, first_batch, insert
+from bridge.outbox.items import batch_between, drop_oldest, first_batch, insert, lose
 from bridge.outbox.schema import TABLES, VERSION
 from bridge.values import Batch, DropReason, Event, Gap, Item, OutboxError, Position
 from common.private_files import make_directory
@@ -157,6 +157,22 @@ class Database:
             write_cursor(self._directory, cursor)
             self._cursor, self._flight = cursor, batch.last_id
             return batch
+
+    def give_up(self, batch: Batch, sequences: Sequence[int]) -> None:
+        """Puts gaps in the place of events that can't be read any more. The batch keeps its bounds.
+
+        It may have been sent when they were whole: so the gaps are of events that may have arrived.
+
+        Args:
+            batch: of `next_batch`, which returns it with the gaps from then on.
+            sequences: of its events.
+
+        Raises:
+            OutboxError: nothing was changed.
+        """
+        with self._use() as db:
+            if self._in_flight(db) == batch:  # Else the database was made anew meanwhile.
+                lose(db, batch, sequences)
 
     def delivered(self, batch: Batch, *, repeated: bool) -> None:
         """Deletes a batch that the hub has.

@@ -1,6 +1,7 @@
 """The items that wait in the outbox's database, in order: events, and gaps in the place of dropped ones."""
 
 import sqlite3
+from collections.abc import Iterable
 from typing import Any, Final
 
 from bridge.outbox import meta
@@ -53,6 +54,18 @@ def batch_between(db: sqlite3.Connection, first_id: int, last_id: int) -> Batch 
             (first_id, last_id),
         )
     )
+
+
+def lose(db: sqlite3.Connection, batch: Batch, sequences: Iterable[int]) -> None:
+    """Puts a gap in the place of each of these events of a batch."""
+    for sequence in sequences:
+        db.execute(
+            "UPDATE items SET payload = NULL, reason = ?"
+            " WHERE payload IS NOT NULL AND first = ? AND id BETWEEN ? AND ?",
+            (int(DropReason.OUTBOX_LOST), sequence, batch.first_id, batch.last_id),
+        )
+        meta.count(db, "dropped", 1)
+        meta.count(db, "events", -1)
 
 
 def drop_oldest(db: sqlite3.Connection, flight: int) -> bool:

@@ -58,6 +58,10 @@ class Outbox:
         """Returns what is to be sent; see `Database.next_batch`."""
         return await self._call(self._database.next_batch)
 
+    async def give_up(self, batch: Batch, sequences: Sequence[int]) -> None:
+        """Puts gaps in the place of events; see `Database.give_up`."""
+        await self._call(self._database.give_up, batch, sequences)
+
     async def delivered(self, batch: Batch, *, repeated: bool) -> None:
         """Deletes a batch; see `Database.delivered`."""
         await self._call(partial(self._database.delivered, batch, repeated=repeated))

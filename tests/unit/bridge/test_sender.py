@@ -1,16 +1,31 @@
-"""When a batch that the hub did not take is sent again."""
+"""When a batch that the hub did not take is sent again, and what becomes of one that the disk has changed."""
 
 import asyncio
+import sqlite3
+from contextlib import closing
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
+
+from bridge.outbox.database import NAME
+from bridge.outbox.outbox import outbox
 from bridge.sender import Sender
-from bridge.values import Batch, Event
+from bridge.values import Batch, Event, Position
 from common.broadcast import Broadcast
 from common.tasks import cancel
 from fleet.connection import FleetAddress, Hub, Published
 from fleet.errors import HubError, HubReason
+from omniseer.fleet.v1.event_pb2 import DROP_REASON_OUTBOX_LOST, EventBatch
+from omniseer.gateway.v1 import event_pb2
+from tests.support.eventually import eventually
 from tests.support.virtual_time import in_virtual_time
+
+
+def event(sequence: int) -> Event:
+    message = event_pb2.Event(run_id="run", sequence=sequence, message=f"event {sequence}")
+    return Event("run", sequence, 1, message.SerializeToString())
 
 
 class Outbox:
@@ -19,7 +34,7 @@ class Outbox:
     results = 0
 
     def __init__(self) -> None:
-        self.batch: Batch | None = Batch((Event("run", 1, 1, b""),), 1, 1)
+        self.batch: Batch | None = Batch((event(1),), 1, 1)
         self.changes = Broadcast()
 
     @property
@@ -73,3 +88,46 @@ async def test_it_is_sent_again_as_soon_as_there_is_another_connection() -> None
     assert outbox.batch is None
     assert hub.attempts[-1] == 40.0
     await cancel([sending])
+
+
+class Taking(Hub):
+    """A hub that takes everything; `batches` is what it has."""
+
+    def __init__(self) -> None:
+        super().__init__(FleetAddress(()))
+        self._set(connected=True, server="a", error=None)
+        self.batches: list[EventBatch] = []
+
+    async def publish_once(self, subject: str, payload: bytes, timeout_s: float = 5.0) -> Published:  # noqa: ARG002
+        self.batches.append(EventBatch.FromString(payload))
+        return Published.DELIVERED
+
+
+@pytest.mark.parametrize("changed", [b"\xff\xff", event(7).payload], ids=["no message", "another one's"])
+async def test_an_event_that_the_disk_has_changed_becomes_a_gap(tmp_path: Path, changed: bytes) -> None:
+    """The defect: the database is whole, and the bridge ended at this event, and again at each start."""
+    async with outbox(tmp_path, 64 << 20) as kept:
+        await kept.position()
+        await kept.append([event(1), event(2), event(3)], None, Position("run", 3))
+    with closing(sqlite3.connect(tmp_path / NAME)) as database:
+        database.execute("UPDATE items SET payload = ? WHERE first = 2", (changed,))
+        database.commit()
+    hub = Taking()
+
+    async with outbox(tmp_path, 64 << 20) as kept:
+        await kept.position()
+        sending = asyncio.create_task(Sender("lab2", kept, hub).run())
+
+        async def waiting() -> int:
+            return kept.facts.events
+
+        await eventually(waiting, lambda count: count == 0 or sending.done(), "all is sent")
+        await cancel([sending])
+        facts = kept.facts
+    (batch,) = hub.batches
+    first, gap, last = batch.items
+    assert (first.event.sequence, last.event.sequence) == (1, 3)
+    assert (gap.dropped.first_sequence, gap.dropped.last_sequence) == (2, 2)
+    assert gap.dropped.reason == DROP_REASON_OUTBOX_LOST
+    assert gap.dropped.worst_severity == 1
+    assert (facts.events, facts.sent, facts.dropped) == (0, 2, 1)
