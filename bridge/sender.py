@@ -43,23 +43,31 @@ class Sender:
         """Batches that the hub had already."""
         self.failures = 0
         """Attempts that failed."""
-        self.error = ""
-        """Why the newest attempt to send events failed, for people; empty after one that succeeded."""
+        self._errors = {"events": "", "results": ""}
+
+    @property
+    def error(self) -> str:
+        """Why events, or else results, are not taken, for people; empty while what there is was taken."""
+        return self._errors["events"] or self._errors["results"]
 
     async def run(self) -> None:
         """Sends events and results."""
         async with asyncio.TaskGroup() as group:
             group.create_task(
-                self._keep_sending(self._send_batch, lambda: self._outbox.facts), name="send-events"
+                self._keep_sending("events", self._send_batch, lambda: self._outbox.facts), name="send-events"
             )
             group.create_task(
-                self._keep_sending(self._send_result, lambda: self._outbox.results), name="send-results"
+                self._keep_sending("results", self._send_result, lambda: self._outbox.results),
+                name="send-results",
             )
 
-    async def _keep_sending(self, send: Callable[[], Awaitable[bool]], kept: Callable[[], object]) -> None:
+    async def _keep_sending(
+        self, what: str, send: Callable[[], Awaitable[bool]], kept: Callable[[], object]
+    ) -> None:
         """Sends what there is, and again when the outbox keeps something new.
 
         Args:
+            what: of `_errors`.
             send: returns False if there is nothing.
             kept: changes with whatever `send` would find.
         """
@@ -68,14 +76,16 @@ class Sender:
             before = kept()
             try:
                 await self._hub.connected()
-                if not await send():
+                found = await send()
+                self._errors[what] = ""
+                if not found:
                     await self._outbox.changes.wait_until(
                         lambda: kept() != before  # noqa: B023  # awaited here
                     )
                 backoff.reset()
             except (HubError, OutboxError) as error:
                 self.failures += 1
-                self.error = str(error)
+                self._errors[what] = str(error)
                 _log.info("it is sent again later: %s", error)
                 await self._hub.pause(backoff.next_s())
 
@@ -83,7 +93,6 @@ class Sender:
         """Sends a batch. Returns False if there is none."""
         batch = await self._outbox.next_batch()
         if batch is None:
-            self.error = ""
             return False
         if changed := [each for each in batch.items if isinstance(each, Event) and not is_whole(each)]:
             numbers = [each.sequence for each in changed]
@@ -94,7 +103,6 @@ class Sender:
         published = await self._hub.publish_once(subject, batch_message(self._robot, batch))
         self.last_sent_s = time.monotonic()
         self.repeats += published is Published.REPEATED
-        self.error = ""
         await self._outbox.delivered(batch, repeated=published is Published.REPEATED)
         return True
 

@@ -44,7 +44,7 @@ class Outbox:
     async def next_batch(self) -> Batch | None:
         return self.batch
 
-    async def next_result(self) -> None:
+    async def next_result(self) -> Any:
         return None
 
     async def delivered(self, batch: Batch, *, repeated: bool) -> None:
@@ -87,6 +87,39 @@ async def test_it_is_sent_again_as_soon_as_there_is_another_connection() -> None
     await asyncio.sleep(0.01)
     assert outbox.batch is None
     assert hub.attempts[-1] == 40.0
+    await cancel([sending])
+
+
+class Results(Outbox):
+    """Has no batch, and the result of a command until it is sent."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.batch = None
+        self.result: tuple[str, bytes] | None = ("c1", b"done")
+
+    async def next_result(self) -> Any:
+        return self.result
+
+    async def result_sent(self, _command_id: str) -> None:
+        self.result = None
+        self.changes.notify_all()
+
+
+@in_virtual_time
+async def test_what_is_said_of_a_result_that_was_not_taken_ends_when_it_is() -> None:
+    """The defect: it stayed in the robot's status until the next event, hours perhaps."""
+    hub, outbox = Silent(), Results()
+    kept: Any = outbox
+    sender = Sender("lab2", kept, hub)
+    sending = asyncio.create_task(sender.run())
+    hub.connect("a")
+    await asyncio.sleep(1.0)
+    assert "no answer about fleet.lab2.res.c1" in sender.error
+    hub.connect("b")
+    await asyncio.sleep(0.01)
+    assert outbox.result is None
+    assert sender.error == ""
     await cancel([sending])
 
 
