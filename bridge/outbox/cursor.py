@@ -45,6 +45,16 @@ def read_cursor(directory: Path) -> Cursor | None:
         raise OutboxError(f"{directory / NAME} can't be read: {error.strerror}") from error
 
 
+def remove_leftovers(directory: Path) -> None:
+    """Removes what kills have left of cursors that were being written; for the only user of the directory.
+
+    Raises:
+        OSError: the disk refuses.
+    """
+    for path in directory.glob(f".{NAME}.*"):
+        path.unlink(missing_ok=True)
+
+
 def write_cursor(directory: Path, cursor: Cursor) -> None:
     """Replaces the cursor; it is on the disk when this returns.
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Final
 
 from bridge.outbox import commands, meta
-from bridge.outbox.cursor import Cursor, read_cursor, write_cursor
+from bridge.outbox.cursor import Cursor, read_cursor, remove_leftovers, write_cursor
 from bridge.outbox.items import batch_between, drop_oldest, first_batch, insert, lose
 from bridge.outbox.schema import TABLES, VERSION
 from bridge.values import Batch, DropReason, Event, Gap, Item, OutboxError, Position
@@ -288,6 +288,8 @@ class Database:
             try:
                 if existed or cursor:
                     self._check(db, cursor)
+                    # The lock is held by now: no other bridge is at it.
+                    remove_leftovers(self._directory)
                     return db
                 return self._begin(db, cursor)
             except BaseException:

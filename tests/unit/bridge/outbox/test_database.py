@@ -356,3 +356,20 @@ def test_rows_of_uploads_are_kept(tmp_path: Path) -> None:
     again = opened(tmp_path)
     assert again.uploads() == ["three"]
     again.close()
+
+
+def test_what_kills_amid_a_new_cursor_have_left_is_removed(tmp_path: Path) -> None:
+    """The defect: each left a file of its own, for ever, beside what the outbox may take."""
+    first = opened(tmp_path)
+    add(first, event(1))
+    sent(first)
+    first.close()
+    left = tmp_path / f".{CURSOR}.k1ll3d"
+    left.write_text("{")
+    other = tmp_path / ".other"
+    other.touch()
+    again = opened(tmp_path)
+    assert sent(again).first == 1
+    again.close()
+    assert not left.exists()
+    assert other.exists()
