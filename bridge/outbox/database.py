@@ -266,9 +266,10 @@ class Database:
             db = self._connection = self._connection or self._open()
             db.execute("BEGIN IMMEDIATE")
             yield db
-            if db.total_changes != changes:  # Or it has just been opened.
-                self._facts = self._read_facts(db)
+            # Or it has just been opened.
+            facts = self._read_facts(db) if db.total_changes != changes else self._facts
             db.execute("COMMIT")
+            self._facts = facts
         except BaseException as error:
             # What the database has not taken is rolled back, and it is examined again when it is opened.
             self.close()

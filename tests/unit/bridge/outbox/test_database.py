@@ -1,6 +1,7 @@
 """The outbox's database on a real disk: order, bounds, and what is left of it after every kind of damage."""
 
 import random
+import resource
 import shutil
 import sqlite3
 from collections.abc import Iterator
@@ -373,3 +374,18 @@ def test_what_kills_amid_a_new_cursor_have_left_is_removed(tmp_path: Path) -> No
     again.close()
     assert not left.exists()
     assert other.exists()
+
+
+def test_what_the_disk_has_refused_is_no_fact(tmp_path: Path, database: Database) -> None:
+    """The defect: while the disk was full, the status showed an event as taken that was not."""
+    add(database, event(1))
+    before = database.facts
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, ((tmp_path / f"{NAME}-wal").stat().st_size, limits[1]))
+    try:
+        with pytest.raises(OutboxError):
+            add(database, event(2, size=60_000))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert database.facts == before
+    assert taken(database) == [event(1)]
