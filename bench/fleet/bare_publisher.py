@@ -1,13 +1,14 @@
 """Sends a state and an event a second with the NATS library alone, until its standard input closes.
 
-    python -m bench.fleet.bare_publisher SERVER FILES ROBOT STATE_BYTES EVENT_BYTES
+    python -m bench.fleet.bare_publisher SERVER FILES ROBOT STATE EVENT
 
-What any program needs that sends what a bridge does, over TLS and until the hub has it: no gateway, no
-outbox, no uploads, nothing that outlives a lost connection.
+STATE and EVENT are files with the payloads. What any program needs that sends what a bridge does, over TLS
+and until the hub has it: no gateway, no outbox, no uploads, nothing that outlives a lost connection.
 """
 
 import asyncio
 import itertools
+import secrets
 import ssl
 import sys
 from pathlib import Path
@@ -39,10 +40,10 @@ async def publish(server: str, files: Path, robot: str, state: bytes, event: byt
         inbox_prefix=names.inbox_prefix(robot).encode(),
     )
     print("ready", flush=True)
-    begun_s = loop.time()
+    run, begun_s = secrets.token_hex(8), loop.time()
     for number in itertools.count(1):
         await hub.request(f"$KV.{names.STATES}.{robot}", state, timeout=_ANSWER_S)
-        await hub.request(names.event_subject(robot, "bare", number), event, timeout=_ANSWER_S)
+        await hub.request(names.event_subject(robot, run, number), event, timeout=_ANSWER_S)
         done, _ = await asyncio.wait([ended], timeout=max(begun_s + number * _PERIOD_S - loop.time(), 0))
         if done:
             break
@@ -51,5 +52,11 @@ async def publish(server: str, files: Path, robot: str, state: bytes, event: byt
 
 if __name__ == "__main__":
     asyncio.run(
-        publish(sys.argv[1], Path(sys.argv[2]), sys.argv[3], bytes(int(sys.argv[4])), bytes(int(sys.argv[5])))
+        publish(
+            sys.argv[1],
+            Path(sys.argv[2]),
+            sys.argv[3],
+            Path(sys.argv[4]).read_bytes(),
+            Path(sys.argv[5]).read_bytes(),
+        )
     )

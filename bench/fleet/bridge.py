@@ -1,8 +1,8 @@
 """What the bridge takes of the robot's computer, at a state and an event a second, as docs/fleet.md promises.
 
 The real program, over TLS, beside a gateway that lists recordings and reads the bridge's reports as the real
-one does. In turns: with `hub.receipts`, so that it looks after uploads; without; and a publisher of as many
-messages of the same size with the NATS library alone, which is what any program takes that sends them.
+one does. In turns: with `hub.receipts`, so that it looks after uploads; without; and a publisher of the
+same messages with the NATS library alone, which is what any program takes that sends them.
 """
 
 import asyncio
@@ -76,7 +76,7 @@ def _rows(full: _Kind, plain: _Kind, bare: _Kind) -> list[Row]:
     )
     found = []
     for name, what, kind in variants:
-        against = f"{what}, against a bare publisher of as many messages with the NATS library alone"
+        against = f"{what}, against a bare publisher of the same messages with the NATS library alone"
         cpu, mib = kind.cpu_percent, kind.mib
         found += [
             Row(
@@ -186,14 +186,17 @@ async def _happening(gateway: EventServer) -> None:
 
 
 async def of_bare_publisher(hub: SecureHub) -> Taken:
-    """Measures a program that sends messages as large as the newest ones of a bridge."""
+    """Measures a program that sends the newest messages of a bridge again and again."""
     async with connect(hub.administrator()) as connection:
         await connection.connected(10)
         state = (await connection.entries(names.STATES))[ROBOT].value
         event = await connection.last(names.EVENTS, names.event_subjects(ROBOT))
     if event is None:
         raise RuntimeError("no bridge has sent an event before")
-    arguments = (hub.servers.urls[0], str(hub.path / ROBOT), ROBOT, str(len(state)), str(len(event.payload)))
+    payloads = {hub.path / "state": state, hub.path / "event": event.payload}
+    for file, payload in payloads.items():
+        file.write_bytes(payload)
+    arguments = (hub.servers.urls[0], str(hub.path / ROBOT), ROBOT, *map(str, payloads))
     with ExitStack() as stack:
         process = await asyncio.to_thread(
             stack.enter_context, program("bench.fleet.bare_publisher", *arguments)
