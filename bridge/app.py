@@ -32,6 +32,7 @@ from common.tasks import first_to_end
 from fleet.connection import FleetAddress, Hub, connect
 from fleet.names import inbox_prefix
 from fleet.receipt_keys import read_public_keys
+from omniseer.bridge.v1 import bridge_service_pb2 as pb
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
@@ -80,8 +81,19 @@ async def serve(settings: BridgeSettings, stop: asyncio.Event) -> None:
             uploads=uploads,
             hub=hub,
         )
+        events = EventReader(settings.gateway, kept)
+
+        def retries() -> pb.Retries:
+            return pb.Retries(
+                hub=sender.failures,
+                state=states.failures,
+                disk=kept.refusals,
+                gateway=events.failures,
+                upload=queue.cuts if queue else 0,
+            )
+
         parts: list[Callable[[], Coroutine[Any, Any, None]]] = [
-            EventReader(settings.gateway, kept).run,
+            events.run,
             robot_status.run,
             sender.run,
             states.run,
@@ -91,7 +103,8 @@ async def serve(settings: BridgeSettings, stop: asyncio.Event) -> None:
         if settings.commands.allowed:
             parts.append(CommandConsumer(settings, hub, requests).run)
         server = rpc.new_server()
-        BridgeServicer(run_id, status, uploads, requests, hub.not_taken).register(server)
+        servicer = BridgeServicer(run_id, status, uploads, requests, not_taken=hub.not_taken, retries=retries)
+        servicer.register(server)
         Health(SERVICE).register(server)
         bind.bind_unix(server, settings.socket)
         await server.start()

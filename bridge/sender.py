@@ -42,7 +42,7 @@ class Sender:
         self.repeats = 0
         """Batches that the hub had already."""
         self.failures = 0
-        """Attempts that failed."""
+        """Attempts that failed at the hub."""
         self._errors = {"events": "", "results": ""}
 
     @property
@@ -84,7 +84,7 @@ class Sender:
                     )
                 backoff.reset()
             except (HubError, OutboxError) as error:
-                self.failures += 1
+                self.failures += isinstance(error, HubError)
                 self._errors[what] = str(error)
                 _log.info("it is sent again later: %s", error)
                 await self._hub.pause(backoff.next_s())

@@ -46,6 +46,8 @@ class StateSender:
         self._version = project_version()
         self.sent = 0
         """Values that the bucket took."""
+        self.failures = 0
+        """Attempts that failed."""
 
     async def run(self) -> None:
         """Sends on a change at most once a second, otherwise every 10 s."""
@@ -63,6 +65,7 @@ class StateSender:
             try:
                 await self._put(state)
             except HubError as error:
+                self.failures += 1
                 _log.info("the robot's state was not taken: %s", error)
                 await self._hub.pause(backoff.next_s())
             else:

@@ -37,8 +37,8 @@ class EventReader:
         self._settings = settings
         self._outbox = outbox
         self._disk_failed = False
-        self.reconnects = 0
-        """Streams after the first one."""
+        self.failures = 0
+        """Streams that have ended, or brought what could not be kept."""
 
     async def run(self) -> None:
         """Reads; a failure of gateway or disk is tried again for as long as it takes."""
@@ -53,7 +53,7 @@ class EventReader:
                 _log.log(level, "no events from the gateway: %s", explained(error))
             except FeedError as error:
                 _log.error("no events from the gateway: %s", error)
-            self.reconnects += 1
+            self.failures += 1
             await backoff.wait()
 
     async def _read(self, backoff: JitteredBackoff) -> None:

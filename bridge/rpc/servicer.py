@@ -1,7 +1,7 @@
 """BridgeService: receives, maps, calls, maps, replies."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from typing import Any, Final
 
 import grpc
@@ -40,6 +40,7 @@ class BridgeServicer(pb_grpc.BridgeServiceServicer):
         uploads: the queue.
         requests: requests of the hub.
         not_taken: counts what the connection to the hub has not taken.
+        retries: returns how often what was tried again.
     """
 
     def __init__(
@@ -48,13 +49,16 @@ class BridgeServicer(pb_grpc.BridgeServiceServicer):
         status: Status,
         uploads: Uploading,
         requests: PendingRequests,
+        *,
         not_taken: NotTaken,
+        retries: Callable[[], pb.Retries],
     ) -> None:
         self._run_id = run_id
         self._status = status
         self._uploads = uploads
         self._requests = requests
         self._not_taken = not_taken
+        self._retries = retries
 
     def register(self, server: grpc.aio.Server) -> None:
         """Adds the methods to a server."""
@@ -106,6 +110,7 @@ class BridgeServicer(pb_grpc.BridgeServiceServicer):
                 strays=self._requests.strays,
                 denied=self._requests.denied,
             ),
+            retries=self._retries(),
         )
 
 

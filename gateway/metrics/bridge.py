@@ -9,7 +9,7 @@ from gateway.links.bridge.copies import Copies
 from gateway.links.bridge.link import BridgeLink
 from gateway.metrics.families import counter, counters, gauge, gauges
 from gateway.rpc.hub_requests import HubRequests
-from gateway.status.cloud import CloudState, CloudView, NotTaken
+from gateway.status.cloud import CloudState, CloudView, NotTaken, Retries
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,11 +47,13 @@ def of_cloud(view: CloudView, now_s: float, bridge: BridgeMetrics) -> Iterator[M
     yield gauge("outbox_bytes", "Size of the outbox.", status.outbox_bytes)
     yield gauge("outbox_max_bytes", "Its limit.", status.outbox_max_bytes)
     yield counter("cloud_events_sent", "Events that the hub has acknowledged.", status.events_sent)
-    dropped = "Events dropped because the outbox was full or its disk refused."
+    dropped = "Events dropped because the outbox was full, or its disk refused or changed them."
     yield counter("cloud_events_dropped", dropped, status.events_dropped)
     not_taken = {field.name: float(getattr(view.newest.not_taken, field.name)) for field in fields(NotTaken)}
     refused = "What the bridge has not taken of all that the hub has sent, by why."
     yield counters("hub_messages_not_taken", refused, "why", not_taken)
+    retries = {field.name: float(getattr(view.newest.retries, field.name)) for field in fields(Retries)}
+    yield counters("bridge_retries", "What has failed in the bridge and is tried again.", "of", retries)
     if status.last_sent_age_ms is not None:
         age_s = status.last_sent_age_ms / 1000
         yield gauge("cloud_last_sent_age_seconds", "Age of the newest acknowledgement.", age_s)

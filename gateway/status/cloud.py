@@ -130,13 +130,24 @@ class NotTaken:
 
 
 @dataclass(frozen=True, slots=True)
+class Retries:
+    """What has failed in the bridge and is tried again; see Retries in bridge_service.proto."""
+
+    hub: int = 0
+    state: int = 0
+    disk: int = 0
+    gateway: int = 0
+    upload: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class BridgeReport:
     """The state of the bridge at one instant; see bridge_service.proto.
 
     Attributes:
         copies: some of those that the recorder is to know; each recording once, others in other reports.
         requests: of the hub, the oldest first.
-        not_taken: counts over the present run of the bridge.
+        not_taken, retries: counts over the present run of the bridge.
     """
 
     instance_id: str
@@ -144,6 +155,7 @@ class BridgeReport:
     copies: tuple[CopyReport, ...] = ()
     requests: tuple[HubRequest, ...] = ()
     not_taken: NotTaken = NotTaken()
+    retries: Retries = Retries()
 
 
 OUTBOX_FULL: Final = 0.9

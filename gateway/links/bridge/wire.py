@@ -27,6 +27,7 @@ from gateway.status.cloud import (
     NotTaken,
     RecordingCopy,
     RecordingCopyState,
+    Retries,
 )
 from omniseer.bridge.v1 import bridge_service_pb2 as pb
 from omniseer.bridge.v1.bridge_service_pb2_grpc import BridgeServiceStub
@@ -142,6 +143,7 @@ def report_from(message: pb.WatchStateResponse, now_s: float) -> BridgeReport:
         tuple(copies.values()),
         tuple(requests.values()),
         same_fields(NotTaken, message.not_taken),
+        same_fields(Retries, message.retries),
     )
 
 

@@ -26,41 +26,43 @@ from omniseer.gateway.v1 import cloud_pb2 as omniseer_dot_gateway_dot_v1_dot_clo
 from omniseer.gateway.v1 import recording_pb2 as omniseer_dot_gateway_dot_v1_dot_recording__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\'omniseer/bridge/v1/bridge_service.proto\x12\x12omniseer.bridge.v1\x1a\x1fomniseer/gateway/v1/cloud.proto\x1a#omniseer/gateway/v1/recording.proto\"\x13\n\x11WatchStateRequest\"\xee\x01\n\x12WatchStateResponse\x12\x13\n\x0binstance_id\x18\x01 \x01(\t\x12\x30\n\x06status\x18\x02 \x01(\x0b\x32 .omniseer.gateway.v1.CloudStatus\x12.\n\x06\x63opies\x18\x03 \x03(\x0b\x32\x1e.omniseer.bridge.v1.CopyReport\x12\x30\n\x08requests\x18\x04 \x03(\x0b\x32\x1e.omniseer.bridge.v1.HubRequest\x12/\n\tnot_taken\x18\x05 \x01(\x0b\x32\x1c.omniseer.bridge.v1.NotTaken\"O\n\x08NotTaken\x12\x12\n\nunreadable\x18\x01 \x01(\x04\x12\x0f\n\x07\x64ropped\x18\x02 \x01(\x04\x12\x0e\n\x06strays\x18\x03 \x01(\x04\x12\x0e\n\x06\x64\x65nied\x18\x04 \x01(\x04\"\x80\x01\n\nCopyReport\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\x12\x30\n\x04\x63opy\x18\x02 \x01(\x0b\x32\".omniseer.gateway.v1.RecordingCopy\x12\x19\n\x0cstate_age_ms\x18\x03 \x01(\x04H\x00\x88\x01\x01\x42\x0f\n\r_state_age_ms\"\xbf\x01\n\nHubRequest\x12\x12\n\nrequest_id\x18\x01 \x01(\t\x12\x11\n\tissued_by\x18\x02 \x01(\t\x12\x14\n\x0cremaining_ms\x18\x03 \x01(\x04\x12\x32\n\x06upload\x18\x04 \x01(\x0b\x32 .omniseer.bridge.v1.UploadActionH\x00\x12\x36\n\x08snapshot\x18\x05 \x01(\x0b\x32\".omniseer.bridge.v1.SnapshotActionH\x00\x42\x08\n\x06\x61\x63tion\"$\n\x0cUploadAction\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\"]\n\x0eSnapshotAction\x12\x12\n\x05pre_s\x18\x01 \x01(\rH\x00\x88\x01\x01\x12\x13\n\x06post_s\x18\x02 \x01(\rH\x01\x88\x01\x01\x12\r\n\x05label\x18\x03 \x01(\tB\x08\n\x06_pre_sB\t\n\x07_post_s\".\n\x16UploadRecordingRequest\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\"K\n\x17UploadRecordingResponse\x12\x30\n\x04\x63opy\x18\x01 \x01(\x0b\x32\".omniseer.gateway.v1.RecordingCopy\"+\n\x13\x43\x61ncelUploadRequest\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\"H\n\x14\x43\x61ncelUploadResponse\x12\x30\n\x04\x63opy\x18\x01 \x01(\x0b\x32\".omniseer.gateway.v1.RecordingCopy\"\x86\x01\n\x14\x41nswerRequestRequest\x12\x12\n\nrequest_id\x18\x01 \x01(\t\x12\x33\n\x07outcome\x18\x02 \x01(\x0e\x32\".omniseer.bridge.v1.RequestOutcome\x12\x0f\n\x07message\x18\x03 \x01(\t\x12\x14\n\x0crecording_id\x18\x04 \x01(\t\"\x17\n\x15\x41nswerRequestResponse*\x84\x01\n\x0eRequestOutcome\x12\x1f\n\x1bREQUEST_OUTCOME_UNSPECIFIED\x10\x00\x12\x18\n\x14REQUEST_OUTCOME_DONE\x10\x01\x12\x1b\n\x17REQUEST_OUTCOME_REFUSED\x10\x02\x12\x1a\n\x16REQUEST_OUTCOME_FAILED\x10\x03\x32\xa3\x03\n\rBridgeService\x12]\n\nWatchState\x12%.omniseer.bridge.v1.WatchStateRequest\x1a&.omniseer.bridge.v1.WatchStateResponse0\x01\x12j\n\x0fUploadRecording\x12*.omniseer.bridge.v1.UploadRecordingRequest\x1a+.omniseer.bridge.v1.UploadRecordingResponse\x12\x61\n\x0c\x43\x61ncelUpload\x12\'.omniseer.bridge.v1.CancelUploadRequest\x1a(.omniseer.bridge.v1.CancelUploadResponse\x12\x64\n\rAnswerRequest\x12(.omniseer.bridge.v1.AnswerRequestRequest\x1a).omniseer.bridge.v1.AnswerRequestResponseb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\'omniseer/bridge/v1/bridge_service.proto\x12\x12omniseer.bridge.v1\x1a\x1fomniseer/gateway/v1/cloud.proto\x1a#omniseer/gateway/v1/recording.proto\"\x13\n\x11WatchStateRequest\"\x9c\x02\n\x12WatchStateResponse\x12\x13\n\x0binstance_id\x18\x01 \x01(\t\x12\x30\n\x06status\x18\x02 \x01(\x0b\x32 .omniseer.gateway.v1.CloudStatus\x12.\n\x06\x63opies\x18\x03 \x03(\x0b\x32\x1e.omniseer.bridge.v1.CopyReport\x12\x30\n\x08requests\x18\x04 \x03(\x0b\x32\x1e.omniseer.bridge.v1.HubRequest\x12/\n\tnot_taken\x18\x05 \x01(\x0b\x32\x1c.omniseer.bridge.v1.NotTaken\x12,\n\x07retries\x18\x06 \x01(\x0b\x32\x1b.omniseer.bridge.v1.Retries\"O\n\x08NotTaken\x12\x12\n\nunreadable\x18\x01 \x01(\x04\x12\x0f\n\x07\x64ropped\x18\x02 \x01(\x04\x12\x0e\n\x06strays\x18\x03 \x01(\x04\x12\x0e\n\x06\x64\x65nied\x18\x04 \x01(\x04\"T\n\x07Retries\x12\x0b\n\x03hub\x18\x01 \x01(\x04\x12\r\n\x05state\x18\x02 \x01(\x04\x12\x0c\n\x04\x64isk\x18\x03 \x01(\x04\x12\x0f\n\x07gateway\x18\x04 \x01(\x04\x12\x0e\n\x06upload\x18\x05 \x01(\x04\"\x80\x01\n\nCopyReport\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\x12\x30\n\x04\x63opy\x18\x02 \x01(\x0b\x32\".omniseer.gateway.v1.RecordingCopy\x12\x19\n\x0cstate_age_ms\x18\x03 \x01(\x04H\x00\x88\x01\x01\x42\x0f\n\r_state_age_ms\"\xbf\x01\n\nHubRequest\x12\x12\n\nrequest_id\x18\x01 \x01(\t\x12\x11\n\tissued_by\x18\x02 \x01(\t\x12\x14\n\x0cremaining_ms\x18\x03 \x01(\x04\x12\x32\n\x06upload\x18\x04 \x01(\x0b\x32 .omniseer.bridge.v1.UploadActionH\x00\x12\x36\n\x08snapshot\x18\x05 \x01(\x0b\x32\".omniseer.bridge.v1.SnapshotActionH\x00\x42\x08\n\x06\x61\x63tion\"$\n\x0cUploadAction\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\"]\n\x0eSnapshotAction\x12\x12\n\x05pre_s\x18\x01 \x01(\rH\x00\x88\x01\x01\x12\x13\n\x06post_s\x18\x02 \x01(\rH\x01\x88\x01\x01\x12\r\n\x05label\x18\x03 \x01(\tB\x08\n\x06_pre_sB\t\n\x07_post_s\".\n\x16UploadRecordingRequest\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\"K\n\x17UploadRecordingResponse\x12\x30\n\x04\x63opy\x18\x01 \x01(\x0b\x32\".omniseer.gateway.v1.RecordingCopy\"+\n\x13\x43\x61ncelUploadRequest\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\"H\n\x14\x43\x61ncelUploadResponse\x12\x30\n\x04\x63opy\x18\x01 \x01(\x0b\x32\".omniseer.gateway.v1.RecordingCopy\"\x86\x01\n\x14\x41nswerRequestRequest\x12\x12\n\nrequest_id\x18\x01 \x01(\t\x12\x33\n\x07outcome\x18\x02 \x01(\x0e\x32\".omniseer.bridge.v1.RequestOutcome\x12\x0f\n\x07message\x18\x03 \x01(\t\x12\x14\n\x0crecording_id\x18\x04 \x01(\t\"\x17\n\x15\x41nswerRequestResponse*\x84\x01\n\x0eRequestOutcome\x12\x1f\n\x1bREQUEST_OUTCOME_UNSPECIFIED\x10\x00\x12\x18\n\x14REQUEST_OUTCOME_DONE\x10\x01\x12\x1b\n\x17REQUEST_OUTCOME_REFUSED\x10\x02\x12\x1a\n\x16REQUEST_OUTCOME_FAILED\x10\x03\x32\xa3\x03\n\rBridgeService\x12]\n\nWatchState\x12%.omniseer.bridge.v1.WatchStateRequest\x1a&.omniseer.bridge.v1.WatchStateResponse0\x01\x12j\n\x0fUploadRecording\x12*.omniseer.bridge.v1.UploadRecordingRequest\x1a+.omniseer.bridge.v1.UploadRecordingResponse\x12\x61\n\x0c\x43\x61ncelUpload\x12\'.omniseer.bridge.v1.CancelUploadRequest\x1a(.omniseer.bridge.v1.CancelUploadResponse\x12\x64\n\rAnswerRequest\x12(.omniseer.bridge.v1.AnswerRequestRequest\x1a).omniseer.bridge.v1.AnswerRequestResponseb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'omniseer.bridge.v1.bridge_service_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
-  _globals['_REQUESTOUTCOME']._serialized_start=1341
-  _globals['_REQUESTOUTCOME']._serialized_end=1473
+  _globals['_REQUESTOUTCOME']._serialized_start=1473
+  _globals['_REQUESTOUTCOME']._serialized_end=1605
   _globals['_WATCHSTATEREQUEST']._serialized_start=133
   _globals['_WATCHSTATEREQUEST']._serialized_end=152
   _globals['_WATCHSTATERESPONSE']._serialized_start=155
-  _globals['_WATCHSTATERESPONSE']._serialized_end=393
-  _globals['_NOTTAKEN']._serialized_start=395
-  _globals['_NOTTAKEN']._serialized_end=474
-  _globals['_COPYREPORT']._serialized_start=477
-  _globals['_COPYREPORT']._serialized_end=605
-  _globals['_HUBREQUEST']._serialized_start=608
-  _globals['_HUBREQUEST']._serialized_end=799
-  _globals['_UPLOADACTION']._serialized_start=801
-  _globals['_UPLOADACTION']._serialized_end=837
-  _globals['_SNAPSHOTACTION']._serialized_start=839
-  _globals['_SNAPSHOTACTION']._serialized_end=932
-  _globals['_UPLOADRECORDINGREQUEST']._serialized_start=934
-  _globals['_UPLOADRECORDINGREQUEST']._serialized_end=980
-  _globals['_UPLOADRECORDINGRESPONSE']._serialized_start=982
-  _globals['_UPLOADRECORDINGRESPONSE']._serialized_end=1057
-  _globals['_CANCELUPLOADREQUEST']._serialized_start=1059
-  _globals['_CANCELUPLOADREQUEST']._serialized_end=1102
-  _globals['_CANCELUPLOADRESPONSE']._serialized_start=1104
-  _globals['_CANCELUPLOADRESPONSE']._serialized_end=1176
-  _globals['_ANSWERREQUESTREQUEST']._serialized_start=1179
-  _globals['_ANSWERREQUESTREQUEST']._serialized_end=1313
-  _globals['_ANSWERREQUESTRESPONSE']._serialized_start=1315
-  _globals['_ANSWERREQUESTRESPONSE']._serialized_end=1338
-  _globals['_BRIDGESERVICE']._serialized_start=1476
-  _globals['_BRIDGESERVICE']._serialized_end=1895
+  _globals['_WATCHSTATERESPONSE']._serialized_end=439
+  _globals['_NOTTAKEN']._serialized_start=441
+  _globals['_NOTTAKEN']._serialized_end=520
+  _globals['_RETRIES']._serialized_start=522
+  _globals['_RETRIES']._serialized_end=606
+  _globals['_COPYREPORT']._serialized_start=609
+  _globals['_COPYREPORT']._serialized_end=737
+  _globals['_HUBREQUEST']._serialized_start=740
+  _globals['_HUBREQUEST']._serialized_end=931
+  _globals['_UPLOADACTION']._serialized_start=933
+  _globals['_UPLOADACTION']._serialized_end=969
+  _globals['_SNAPSHOTACTION']._serialized_start=971
+  _globals['_SNAPSHOTACTION']._serialized_end=1064
+  _globals['_UPLOADRECORDINGREQUEST']._serialized_start=1066
+  _globals['_UPLOADRECORDINGREQUEST']._serialized_end=1112
+  _globals['_UPLOADRECORDINGRESPONSE']._serialized_start=1114
+  _globals['_UPLOADRECORDINGRESPONSE']._serialized_end=1189
+  _globals['_CANCELUPLOADREQUEST']._serialized_start=1191
+  _globals['_CANCELUPLOADREQUEST']._serialized_end=1234
+  _globals['_CANCELUPLOADRESPONSE']._serialized_start=1236
+  _globals['_CANCELUPLOADRESPONSE']._serialized_end=1308
+  _globals['_ANSWERREQUESTREQUEST']._serialized_start=1311
+  _globals['_ANSWERREQUESTREQUEST']._serialized_end=1445
+  _globals['_ANSWERREQUESTRESPONSE']._serialized_start=1447
+  _globals['_ANSWERREQUESTRESPONSE']._serialized_end=1470
+  _globals['_BRIDGESERVICE']._serialized_start=1608
+  _globals['_BRIDGESERVICE']._serialized_end=2027
 # @@protoc_insertion_point(module_scope)

@@ -77,6 +77,7 @@ class WatchStateResponse(_message.Message):
     COPIES_FIELD_NUMBER: _builtins.int
     REQUESTS_FIELD_NUMBER: _builtins.int
     NOT_TAKEN_FIELD_NUMBER: _builtins.int
+    RETRIES_FIELD_NUMBER: _builtins.int
     instance_id: _builtins.str
     """Random for every process."""
     @_builtins.property
@@ -101,6 +102,10 @@ class WatchStateResponse(_message.Message):
     def not_taken(self) -> Global___NotTaken:
         """What was not taken of all that the hub has sent since the bridge started."""
 
+    @_builtins.property
+    def retries(self) -> Global___Retries:
+        """What failed and is tried again, since the bridge started."""
+
     def __init__(
         self,
         *,
@@ -109,10 +114,11 @@ class WatchStateResponse(_message.Message):
         copies: _abc.Iterable[Global___CopyReport] | None = ...,
         requests: _abc.Iterable[Global___HubRequest] | None = ...,
         not_taken: Global___NotTaken | None = ...,
+        retries: Global___Retries | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["not_taken", b"not_taken", "status", b"status"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["not_taken", b"not_taken", "retries", b"retries", "status", b"status"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["copies", b"copies", "instance_id", b"instance_id", "not_taken", b"not_taken", "requests", b"requests", "status", b"status"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["copies", b"copies", "instance_id", b"instance_id", "not_taken", b"not_taken", "requests", b"requests", "retries", b"retries", "status", b"status"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -151,6 +157,44 @@ class NotTaken(_message.Message):
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___NotTaken: _TypeAlias = NotTaken  # noqa: Y015
+
+@_typing.final
+class Retries(_message.Message):
+    """Attempts that failed. Each is followed by another one after a pause."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    HUB_FIELD_NUMBER: _builtins.int
+    STATE_FIELD_NUMBER: _builtins.int
+    DISK_FIELD_NUMBER: _builtins.int
+    GATEWAY_FIELD_NUMBER: _builtins.int
+    UPLOAD_FIELD_NUMBER: _builtins.int
+    hub: _builtins.int
+    """To have the hub take events or the result of a command, while there was a connection to it."""
+    state: _builtins.int
+    """To have the hub take the robot's state, likewise."""
+    disk: _builtins.int
+    """To use the outbox: its disk refused."""
+    gateway: _builtins.int
+    """To read the gateway's events: the stream ended, or what it brought could not be kept."""
+    upload: _builtins.int
+    """To upload a recording: gateway, hub or store failed."""
+    def __init__(
+        self,
+        *,
+        hub: _builtins.int = ...,
+        state: _builtins.int = ...,
+        disk: _builtins.int = ...,
+        gateway: _builtins.int = ...,
+        upload: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["disk", b"disk", "gateway", b"gateway", "hub", b"hub", "state", b"state", "upload", b"upload"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___Retries: _TypeAlias = Retries  # noqa: Y015
 
 @_typing.final
 class CopyReport(_message.Message):

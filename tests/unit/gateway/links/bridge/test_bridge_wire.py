@@ -16,7 +16,7 @@ from gateway.links.bridge import wire
 from gateway.links.bridge.refusals import REFUSALS
 from gateway.links.bridge.requests import Outcome
 from gateway.links.watch import LinkLostError
-from gateway.status.cloud import CloudState, HubAction, NotTaken, RecordingCopyState
+from gateway.status.cloud import CloudState, HubAction, NotTaken, RecordingCopyState, Retries
 from omniseer.bridge.v1 import bridge_service_pb2 as pb
 from omniseer.gateway.v1 import cloud_pb2, recording_pb2
 
@@ -60,6 +60,8 @@ def test_a_report_arrives_whole() -> None:
     snapshot.snapshot.pre_s, snapshot.snapshot.label = 0, "here"
     made.not_taken.unreadable, made.not_taken.dropped = 1, 2
     made.not_taken.strays, made.not_taken.denied = 3, 4
+    made.retries.hub, made.retries.state, made.retries.disk = 5, 6, 7
+    made.retries.gateway, made.retries.upload = 8, 9
     report = wire.report_from(made, NOW_S)
     assert (report.status.robot, report.status.events_sent) == ("lab-1", 7)
     assert (report.status.last_sent_age_ms, report.status.uploading) == (None, None)
@@ -68,6 +70,7 @@ def test_a_report_arrives_whole() -> None:
         ("b", RecordingCopyState.UNSPECIFIED, NOW_S - 1.5),
     ]
     assert report.not_taken == NotTaken(1, 2, 3, 4)
+    assert report.retries == Retries(5, 6, 7, 8, 9)
     first, second = report.requests
     assert (first.action, first.recording_id, first.issued_by) == (HubAction.UPLOAD, "a", "anna")
     assert first.expires_s == NOW_S + 5
