@@ -97,6 +97,7 @@ async def serve(settings: BridgeSettings, stop: asyncio.Event) -> None:
             robot_status.run,
             sender.run,
             states.run,
+            hub.lasting,
         ]
         if queue:
             parts += [partial(queue.run, stop), partial(apply_rule, queue, gateway)]

@@ -143,6 +143,7 @@ class Hub:
         """Whether a server has accepted in the present attempt."""
         self._services: list[Service] = []
         self._calls: set[asyncio.Task[None]] = set()
+        self._supervisor: asyncio.Task[None] | None = None
         self._link = Link(False, "", None, "", asyncio.get_running_loop().time(), 0)
         self.changed = Broadcast()
         """Notified after each change of `link`."""
@@ -411,6 +412,23 @@ class Hub:
             else:
                 await asyncio.sleep(backoff.next_s() * random.uniform(0.5, 1.0))  # noqa: S311
 
+    def supervise(self) -> asyncio.Task[None]:
+        """Begins to keep a connection; returns the task, which its owner cancels."""
+        self._supervisor = asyncio.create_task(self.run())
+        return self._supervisor
+
+    async def lasting(self) -> None:
+        """Waits for a defect that ends the supervisor, which makes all connections, and raises it.
+
+        A part of each program that runs for long: without it, the program would stay without the hub.
+        """
+        if self._supervisor is None:
+            raise RuntimeError("nothing makes connections to the hub")
+        await asyncio.wait([self._supervisor])
+        if not self._supervisor.cancelled():
+            self._supervisor.result()
+        raise RuntimeError("what makes connections to the hub has ended")
+
     async def close(self) -> None:
         """Ends the requests in hand."""
         await cancel(self._calls)
@@ -505,7 +523,7 @@ class Hub:
 async def connect(address: FleetAddress) -> AsyncGenerator[Hub, None]:
     """Keeps a connection to the hub while the block runs. It need not stand yet when the block begins."""
     hub = Hub(address)
-    supervisor = asyncio.create_task(hub.run())
+    supervisor = hub.supervise()
     try:
         yield hub
     finally:

@@ -98,7 +98,7 @@ async def export(
         async with serving_metrics(exporter.collector.text, host, port) as bound:
             listening(bound)
             # A defect ends the program: a page with the last state for ever would raise no alarm.
-            await first_to_end(stop.wait(), exporter.run())
+            await first_to_end(stop.wait(), hub.lasting(), exporter.run())
 
 
 async def export_until_stopped(address: FleetAddress, host: str, port: int) -> None:

@@ -79,6 +79,7 @@ async def serve(settings: ReceiverSettings, stop: asyncio.Event) -> None:
                 _log.info("receiving recordings of the fleet %s", settings.fleet)
                 await first_to_end(
                     stop.wait(),
+                    hub.lasting(),
                     _report_health(hub, health),
                     _sweep_for_ever(settings, store, threads, metrics),
                 )
