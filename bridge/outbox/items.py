@@ -15,7 +15,21 @@ _ENVELOPE_BYTES: Final = 1024
 _ITEM_BYTES: Final = 64
 """Of an item besides its payload."""
 _COLUMNS: Final = "id, run_id, first, last, severity, payload, reason, earlier, probes"
+_SENSE: Final = f"""
+    typeof(run_id) = 'text' AND length(run_id) BETWEEN 1 AND 64 AND run_id NOT GLOB '*[^A-Za-z0-9_-]*'
+    AND typeof(first) = 'integer' AND typeof(last) = 'integer' AND first >= 0 AND last >= first - 1
+    AND typeof(severity) = 'integer' AND typeof(earlier) = 'integer' AND typeof(probes) = 'integer'
+    AND typeof(reason) = 'integer' AND reason BETWEEN 0 AND {max(DropReason)}
+    AND (payload IS NULL OR typeof(payload) = 'blob' AND first = last)
+"""
+"""What holds for each row that a bridge has written; of an event's payload, encoding.py says more."""
 _NumberedGap = tuple[int, Gap]
+
+
+def all_make_sense(db: sqlite3.Connection) -> bool:
+    """Returns whether each row can be one that a bridge has written: no checksum says so."""
+    (wrong,) = db.execute(f"SELECT EXISTS (SELECT 1 FROM items WHERE NOT ({_SENSE}))").fetchone()  # noqa: S608  # constants
+    return not wrong
 
 
 def insert(db: sqlite3.Connection, item: Item) -> None:

@@ -389,3 +389,29 @@ def test_what_the_disk_has_refused_is_no_fact(tmp_path: Path, database: Database
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert database.facts == before
     assert taken(database) == [event(1)]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "reason = 99 WHERE first = 2",
+        "run_id = 'run 1' WHERE first = 1",
+        "run_id = CAST(x'ff' AS TEXT) WHERE first = 1",
+        "last = 'x' WHERE first = 3",
+        "last = 7 WHERE first = 3",
+        "payload = 7 WHERE first = 3",
+    ],
+)
+def test_rows_that_no_bridge_writes_are_damage(tmp_path: Path, change: str) -> None:
+    """The defect: a bridge ended at one, or tried to send it for ever, and again after each start."""
+    first = opened(tmp_path)
+    add(first, event(1), Gap(RUN, 2, 2, DropReason.DISK), event(3))
+    first.close()
+    with closing(sqlite3.connect(tmp_path / NAME)) as changed:
+        assert changed.execute(f"UPDATE items SET {change}").rowcount == 1  # noqa: S608  # the test's own
+        changed.commit()
+    again = opened(tmp_path)
+    assert again.is_new()
+    assert taken(again) == []
+    again.close()
+    assert (tmp_path / DAMAGED_NAME).exists()
