@@ -169,7 +169,7 @@ PARTS: Final = (
     Part("bench.fleet.rates", 2, ("fleet.events_s", "fleet.batched_events_s")),
     Part(
         "bench.fleet.cost",
-        8,
+        5,
         (
             "fleet.robot_kib",
             "fleet.state_cpu_us",
