@@ -15,7 +15,7 @@ from typing import Final
 
 from bridge.outbox import commands, meta
 from bridge.outbox.cursor import Cursor, read_cursor, remove_leftovers, write_cursor
-from bridge.outbox.items import all_make_sense, batch_between, drop_oldest, first_batch, insert, lose
+from bridge.outbox.items import all_make_sense, batch_between, drop_oldest, first_batch, insert, lose, restore
 from bridge.outbox.schema import TABLES, VERSION
 from bridge.values import Batch, DropReason, Event, Gap, Item, OutboxError, Position
 from common.private_files import make_directory
@@ -361,8 +361,6 @@ class Database:
             raise _DamagedError("it has no tables")
         if (verdict := db.execute("PRAGMA integrity_check(1)").fetchone()[0]) != "ok":
             raise _DamagedError(str(verdict).splitlines()[0])
-        if not all_make_sense(db):
-            raise _DamagedError("a row makes no sense")
         if cursor is None:
             raise _DamagedError("its cursor is missing")
         if meta.get(db, "outbox") != cursor.outbox:
@@ -372,10 +370,15 @@ class Database:
         ).fetchone()[0]
         if newest < cursor.last_id:
             raise _DamagedError("it is older than its cursor")
+        db.execute("BEGIN IMMEDIATE")
         # What comes before the cursor was delivered.
         db.execute("DELETE FROM items WHERE id < ?", (cursor.first_id,))
+        restore(db)
+        if not all_make_sense(db):
+            raise _DamagedError("a row makes no sense")
         (events,) = db.execute("SELECT count(*) FROM items WHERE payload IS NOT NULL").fetchone()
         meta.put(db, "events", events)
+        db.execute("COMMIT")
         self._cursor, self._flight = cursor, cursor.last_id
         batch = self._in_flight(db)
         if batch is None:

@@ -17,17 +17,36 @@ _ITEM_BYTES: Final = 64
 _COLUMNS: Final = "id, run_id, first, last, severity, payload, reason, earlier, probes"
 _SENSE: Final = f"""
     typeof(run_id) = 'text' AND length(run_id) BETWEEN 1 AND 64 AND run_id NOT GLOB '*[^A-Za-z0-9_-]*'
-    AND typeof(first) = 'integer' AND typeof(last) = 'integer' AND first >= 0 AND last >= first - 1
-    AND typeof(severity) = 'integer' AND typeof(earlier) = 'integer' AND typeof(probes) = 'integer'
-    AND typeof(reason) = 'integer' AND reason BETWEEN 0 AND {max(DropReason)}
-    AND (payload IS NULL OR typeof(payload) = 'blob' AND first = last)
+    AND typeof(first) = 'integer' AND first >= 0
+    AND (payload IS NOT NULL OR
+      typeof(last) = 'integer' AND last >= first - 1
+      AND typeof(earlier) = 'integer' AND typeof(probes) = 'integer'
+      AND typeof(reason) = 'integer' AND reason BETWEEN 0 AND {max(DropReason)})
 """
-"""What holds for each row that a bridge has written; of an event's payload, encoding.py says more."""
+"""What holds for each row that can be sent; of an event's payload, encoding.py says more."""
 _NumberedGap = tuple[int, Gap]
 
 
+def restore(db: sqlite3.Connection) -> None:
+    """Undoes what a bad disk has done to columns that say nothing in their row; no checksum guards them.
+
+    In an event's row that is all that only a gap has. An event whose payload can't be bytes becomes a gap.
+    """
+    db.execute("UPDATE items SET severity = 0 WHERE typeof(severity) <> 'integer'")
+    lost = db.execute(
+        "UPDATE items SET payload = NULL, last = first, reason = ?, earlier = 0, probes = 0"
+        " WHERE typeof(payload) NOT IN ('null', 'blob')",
+        (int(DropReason.OUTBOX_LOST),),
+    )
+    meta.count(db, "dropped", lost.rowcount)
+    db.execute(
+        "UPDATE items SET last = first, reason = 0, earlier = 0, probes = 0 WHERE payload IS NOT NULL"
+        " AND NOT (last IS first AND reason IS 0 AND earlier IS 0 AND probes IS 0)"
+    )
+
+
 def all_make_sense(db: sqlite3.Connection) -> bool:
-    """Returns whether each row can be one that a bridge has written: no checksum says so."""
+    """Returns whether each row can be sent as it is."""
     (wrong,) = db.execute(f"SELECT EXISTS (SELECT 1 FROM items WHERE NOT ({_SENSE}))").fetchone()  # noqa: S608  # constants
     return not wrong
 

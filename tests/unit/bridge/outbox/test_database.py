@@ -391,27 +391,62 @@ def test_what_the_disk_has_refused_is_no_fact(tmp_path: Path, database: Database
     assert taken(database) == [event(1)]
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        "reason = 99 WHERE first = 2",
-        "run_id = 'run 1' WHERE first = 1",
-        "run_id = CAST(x'ff' AS TEXT) WHERE first = 1",
-        "last = 'x' WHERE first = 3",
-        "last = 7 WHERE first = 3",
-        "payload = 7 WHERE first = 3",
-    ],
-)
-def test_rows_that_no_bridge_writes_are_damage(tmp_path: Path, change: str) -> None:
+def change(directory: Path, what: str) -> None:
+    """Does what a bad disk can: a row of a database that is whole is another one."""
+    with closing(sqlite3.connect(directory / NAME)) as changed:
+        assert changed.execute(f"UPDATE {what}").rowcount == 1
+        changed.commit()
+
+
+@pytest.mark.parametrize("what", ["reason = 99", "last = 'x'", "last = -7", "earlier = 'x'"])
+def test_gaps_that_no_bridge_writes_are_damage(tmp_path: Path, what: str) -> None:
     """The defect: a bridge ended at one, or tried to send it for ever, and again after each start."""
     first = opened(tmp_path)
-    add(first, event(1), Gap(RUN, 2, 2, DropReason.DISK), event(3))
+    add(first, event(1), Gap(RUN, 2, 2, DropReason.DISK))
     first.close()
-    with closing(sqlite3.connect(tmp_path / NAME)) as changed:
-        assert changed.execute(f"UPDATE items SET {change}").rowcount == 1  # noqa: S608  # the test's own
-        changed.commit()
+    change(tmp_path, f"items SET {what} WHERE first = 2")
     again = opened(tmp_path)
     assert again.is_new()
     assert taken(again) == []
     again.close()
     assert (tmp_path / DAMAGED_NAME).exists()
+
+
+@pytest.mark.parametrize("what", ["reason = 64", "last = 'x'", "last = 7", "earlier = 'x'", "probes = 1.5"])
+def test_what_says_nothing_in_an_events_row_costs_nothing(tmp_path: Path, what: str) -> None:
+    """The defect: the outbox was moved aside, with all events that had not been sent."""
+    first = opened(tmp_path)
+    add(first, event(1), event(2), event(3))
+    first.close()
+    change(tmp_path, f"items SET {what} WHERE first = 2")
+    again = opened(tmp_path)
+    assert taken(again) == [event(1), event(2), event(3)]
+    again.close()
+    assert not (tmp_path / DAMAGED_NAME).exists()
+
+
+@pytest.mark.parametrize("what", ["reason = 64", "last = 7", "earlier = 1", "severity = 'x'"])
+def test_nor_does_it_in_the_gap_that_takes_the_events_place(tmp_path: Path, what: str) -> None:
+    first = opened(tmp_path)
+    add(first, event(1), event(2), event(3))
+    first.close()
+    change(tmp_path, f"items SET {what} WHERE first = 2")
+    again = opened(tmp_path)
+    while again.drop_oldest():
+        pass
+    (gap,) = taken(again)
+    assert (gap.run_id, gap.first, gap.last) == (RUN, 1, 3)
+    assert isinstance(gap, Gap)
+    assert not gap.earlier
+    again.close()
+
+
+def test_an_event_that_is_no_bytes_becomes_a_gap(tmp_path: Path) -> None:
+    first = opened(tmp_path)
+    add(first, event(1), event(2), event(3))
+    first.close()
+    change(tmp_path, "items SET payload = 7 WHERE first = 2")
+    again = opened(tmp_path)
+    assert taken(again) == [event(1), Gap(RUN, 2, 2, DropReason.OUTBOX_LOST, worst=1), event(3)]
+    assert (again.facts.sent, again.facts.dropped) == (2, 1)
+    again.close()
