@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from bridge.outbox import commands, meta
+from bridge.outbox import commands, meta, order
 from bridge.outbox.cursor import Cursor, read_cursor, remove_leftovers, write_cursor
 from bridge.outbox.items import all_make_sense, batch_between, drop_oldest, first_batch, insert, lose, restore
 from bridge.outbox.schema import TABLES, VERSION
@@ -313,6 +313,8 @@ class Database:
     def _connect(self) -> sqlite3.Connection:
         # Its thread is the only one, but not the one that made this object.
         db = sqlite3.connect(self._path, timeout=0, isolation_level=None, check_same_thread=False)
+        # What a bad disk has changed need not be UTF-8. It is judged like any other text, not an error.
+        db.text_factory = lambda text: text.decode(errors="replace")
         try:
             # The lock is held until the end, so that a second bridge is refused.
             db.execute("PRAGMA locking_mode = EXCLUSIVE")
@@ -374,6 +376,8 @@ class Database:
         # What comes before the cursor was delivered.
         db.execute("DELETE FROM items WHERE id < ?", (cursor.first_id,))
         restore(db)
+        if not order.restored(db, meta.get(db, "run_id"), meta.get(db, "sequence")):
+            raise _DamagedError("its rows are not in order")
         if not all_make_sense(db):
             raise _DamagedError("a row makes no sense")
         (events,) = db.execute("SELECT count(*) FROM items WHERE payload IS NOT NULL").fetchone()

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from bridge.outbox.database import NAME
+from bridge.outbox.database import NAME, Facts
 from bridge.outbox.outbox import outbox
 from bridge.sender import Sender
 from bridge.values import Batch, Event, Position
@@ -136,18 +136,17 @@ class Taking(Hub):
         return Published.DELIVERED
 
 
-@pytest.mark.parametrize("changed", [b"\xff\xff", event(7).payload], ids=["no message", "another one's"])
-async def test_an_event_that_the_disk_has_changed_becomes_a_gap(tmp_path: Path, changed: bytes) -> None:
-    """The defect: the database is whole, and the bridge ended at this event, and again at each start."""
-    async with outbox(tmp_path, 64 << 20) as kept:
+async def all_sent(directory: Path, changed: str, value: object) -> tuple[list[EventBatch], Facts]:
+    """Returns what a hub gets of three events, of which a bad disk has changed the second one, and facts."""
+    async with outbox(directory, 64 << 20) as kept:
         await kept.position()
         await kept.append([event(1), event(2), event(3)], None, Position("run", 3))
-    with closing(sqlite3.connect(tmp_path / NAME)) as database:
-        database.execute("UPDATE items SET payload = ? WHERE first = 2", (changed,))
+    with closing(sqlite3.connect(directory / NAME)) as database:
+        database.execute(f"UPDATE items SET {changed} = ? WHERE first = 2", (value,))  # noqa: S608  # the test's own
         database.commit()
     hub = Taking()
 
-    async with outbox(tmp_path, 64 << 20) as kept:
+    async with outbox(directory, 64 << 20) as kept:
         await kept.position()
         sending = asyncio.create_task(Sender("lab2", kept, hub).run())
 
@@ -156,11 +155,24 @@ async def test_an_event_that_the_disk_has_changed_becomes_a_gap(tmp_path: Path, 
 
         await eventually(waiting, lambda count: count == 0 or sending.done(), "all is sent")
         await cancel([sending])
-        facts = kept.facts
-    (batch,) = hub.batches
+        return hub.batches, kept.facts
+
+
+@pytest.mark.parametrize("changed", [b"\xff\xff", event(7).payload], ids=["no message", "another one's"])
+async def test_an_event_that_the_disk_has_changed_becomes_a_gap(tmp_path: Path, changed: bytes) -> None:
+    """The defect: the database is whole, and the bridge ended at this event, and again at each start."""
+    (batch,), facts = await all_sent(tmp_path, "payload", changed)
     first, gap, last = batch.items
     assert (first.event.sequence, last.event.sequence) == (1, 3)
     assert (gap.dropped.first_sequence, gap.dropped.last_sequence) == (2, 2)
     assert gap.dropped.reason == DROP_REASON_OUTBOX_LOST
     assert gap.dropped.worst_severity == 1
     assert (facts.events, facts.sent, facts.dropped) == (0, 2, 1)
+
+
+async def test_an_event_whose_row_is_of_another_run_is_sent_all_the_same(tmp_path: Path) -> None:
+    """The defect: it was lost without a gap, and a gap of a run that there never was came in its place."""
+    (batch,), facts = await all_sent(tmp_path, "run_id", "rum")
+    assert (batch.run_id, batch.first_sequence, batch.last_sequence) == ("run", 1, 3)
+    assert [each.event.sequence for each in batch.items] == [1, 2, 3]
+    assert (facts.events, facts.sent, facts.dropped) == (0, 3, 0)
