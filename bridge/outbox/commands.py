@@ -14,6 +14,16 @@ MOST_COMMANDS: Final = 1024
 """Commands that are remembered, so that none is carried out twice."""
 
 
+def restore(db: sqlite3.Connection) -> None:
+    """Ends commands that a bad disk has changed: they have no result that can be sent, or no ID for it."""
+    changed = db.execute(
+        "UPDATE commands SET result = x'', sent = 1 WHERE typeof(result) NOT IN ('null', 'blob')"
+        " OR typeof(command_id) <> 'text' OR command_id GLOB '*[^A-Za-z0-9]*'"
+    )
+    if changed.rowcount:
+        _log.error("commands that the disk has changed get no result: %d", changed.rowcount)
+
+
 def begin(db: sqlite3.Connection, command_id: str) -> bool:
     """Remembers a command; returns False if it is known already."""
     known = db.execute("SELECT 1 FROM commands WHERE command_id = ?", (command_id,)).fetchone()

@@ -368,15 +368,20 @@ class Database:
         if meta.get(db, "outbox") != cursor.outbox:
             raise _DamagedError("its cursor belongs to another one")
         newest = db.execute(
-            "SELECT coalesce(max(seq), 0) FROM sqlite_sequence WHERE name = 'items'"
+            "SELECT coalesce(max(CAST(seq AS INTEGER)), 0) FROM sqlite_sequence WHERE name = 'items'"
         ).fetchone()[0]
         if newest < cursor.last_id:
             raise _DamagedError("it is older than its cursor")
         db.execute("BEGIN IMMEDIATE")
         # What comes before the cursor was delivered.
         db.execute("DELETE FROM items WHERE id < ?", (cursor.first_id,))
+        meta.restore_counts(db)
+        commands.restore(db)
         restore(db)
-        if not order.restored(db, meta.get(db, "run_id"), meta.get(db, "sequence")):
+        if not meta.position_makes_sense(db):
+            raise _DamagedError("its position makes no sense")
+        position = meta.get(db, "run_id"), meta.get(db, "sequence")
+        if not order.restored(db, position, (cursor.run_id, cursor.last) if cursor.last_id else None):
             raise _DamagedError("its rows are not in order")
         if not all_make_sense(db):
             raise _DamagedError("a row makes no sense")

@@ -1,7 +1,11 @@
 """Single values of the outbox's database: whose it is, where it stands, what it has counted."""
 
 import sqlite3
-from typing import Any
+from typing import Any, Final
+
+COUNTS: Final = ("events", "sent", "dropped")
+_LARGEST: Final = 2**53
+"""Of a count: a robot has far fewer events."""
 
 
 def get(db: sqlite3.Connection, key: str) -> Any:
@@ -19,3 +23,23 @@ def count(db: sqlite3.Connection, key: str, more: int) -> None:
     """Adds to a number."""
     if more:
         put(db, key, (get(db, key) or 0) + more)
+
+
+def restore_counts(db: sqlite3.Connection) -> None:
+    """Begins a count anew that a bad disk has changed to what is none."""
+    db.executemany(
+        "UPDATE meta SET value = 0"
+        " WHERE key = ? AND NOT (typeof(value) = 'integer' AND value BETWEEN 0 AND ?)",
+        [(key, _LARGEST) for key in COUNTS],
+    )
+
+
+def position_makes_sense(db: sqlite3.Connection) -> bool:
+    """Returns whether there is a whole position, or none."""
+    match get(db, "run_id"), get(db, "sequence"):
+        case (None, None):
+            return True
+        case (str(), int(sequence)):
+            return sequence >= 0
+        case _:
+            return False

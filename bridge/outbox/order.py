@@ -7,6 +7,8 @@ last one ends at the position that the outbox has.
 import sqlite3
 from typing import Final
 
+Place = tuple[str | None, int | None]
+"""Run and sequence."""
 _MOST_MISPLACED: Final = 8
 """Rows that are put right; more are not the work of a single bad place of a disk."""
 _MISPLACED: Final = """
@@ -32,15 +34,15 @@ _DISORDER: Final = """
 """
 
 
-def restored(db: sqlite3.Connection, run_id: str | None, sequence: int | None) -> bool:
+def restored(db: sqlite3.Connection, position: Place, sent: Place | None) -> bool:
     """Returns whether all items are in order, after rows that are not have been put right where they can be.
 
     A row can be whose neighbours fit each other: it gets the place between them.
 
     Args:
         db: the outbox's database.
-        run_id: of the position after the last item.
-        sequence: of the position.
+        position: after the last item, as the database has it.
+        sent: where the batch ended that was sent last; it is the position where there are no items.
     """
     for _ in range(_MOST_MISPLACED):
         if not (disorder := db.execute(_DISORDER).fetchone()[0]):
@@ -52,4 +54,4 @@ def restored(db: sqlite3.Connection, run_id: str | None, sequence: int | None) -
             "UPDATE items SET run_id = ?, first = ?, last = ?, earlier = 0 WHERE id = ?", (*place, row_id)
         )
     last = db.execute("SELECT run_id, last FROM items ORDER BY id DESC LIMIT 1").fetchone()
-    return not disorder and last in (None, (run_id, sequence))
+    return not disorder and (last or sent) in (None, position)

@@ -522,3 +522,76 @@ def test_rows_out_of_order_without_a_place_for_them_are_damage(tmp_path: Path, w
         assert again.is_new()
         assert taken(again) == []
     assert (tmp_path / DAMAGED_NAME).exists()
+
+
+@pytest.mark.parametrize(
+    "what",
+    [
+        "key = 'sequencd' WHERE key = 'sequence'",
+        "key = 'run_ie' WHERE key = 'run_id'",
+        "value = 'x' WHERE key = 'sequence'",
+        "value = -1 WHERE key = 'sequence'",
+        "value = 2 WHERE key = 'sequence'",
+        "value = 67 WHERE key = 'sequence'",
+        "value = 7 WHERE key = 'run_id'",
+        "value = CAST(x'ff' AS TEXT) WHERE key = 'run_id'",
+    ],
+)
+def test_a_position_that_is_none_or_another_is_damage(tmp_path: Path, what: str) -> None:
+    """The defect: the bridge ended at it, and again at each start; or events were lost without a gap."""
+    with closing(opened(tmp_path)) as first:
+        add(first, event(1), event(2), event(3))
+        first.delivered(sent(first), repeated=False)
+    change(tmp_path, f"meta SET {what}")
+    with closing(opened(tmp_path)) as again:
+        again.open()
+        assert again.facts.position == Position(RUN, 3), "which the cursor has"
+        assert again.is_new()
+    assert (tmp_path / DAMAGED_NAME).exists()
+
+
+@pytest.mark.parametrize("key", ["events", "sent", "dropped"])
+@pytest.mark.parametrize("value", ["'x'", "x'ff'", "CAST(x'ff' AS TEXT)", "-1", "9223372036854775807", "0.5"])
+def test_a_count_that_is_none_begins_anew(tmp_path: Path, key: str, value: str) -> None:
+    """The defect: the bridge ended at it, and again at each start."""
+    with closing(opened(tmp_path)) as first:
+        add(first, event(1), event(2), event(3))
+        assert first.drop_oldest()
+        first.delivered(sent(first), repeated=False)
+        add(first, event(4))
+    change(tmp_path, f"meta SET value = {value} WHERE key = '{key}'")
+    with closing(opened(tmp_path)) as again:
+        again.open()
+        facts = again.facts
+        assert {"events": 1, "sent": 2, "dropped": 1} | ({} if key == "events" else {key: 0}) == {
+            "events": facts.events,
+            "sent": facts.sent,
+            "dropped": facts.dropped,
+        }
+        assert taken(again) == [event(4)]
+
+
+@pytest.mark.parametrize(
+    "what", ["result = 'done'", "result = 7", "command_id = 'a b'", "command_id = CAST(x'ff' AS TEXT)"]
+)
+def test_a_command_that_no_bridge_writes_has_no_result(tmp_path: Path, what: str) -> None:
+    """The defect: the bridge ended at it, and again at each start; or it sent the result for ever."""
+    with closing(opened(tmp_path)) as first:
+        first.end_command("a1", b"done")
+        first.end_command("b2", b"done")
+    change(tmp_path, f"commands SET {what} WHERE command_id = 'a1'")
+    with closing(opened(tmp_path)) as again:
+        assert again.next_result() == ("b2", b"done")
+        again.result_sent("b2")
+        assert again.next_result() is None
+        assert again.unanswered_commands() == []
+    assert not (tmp_path / DAMAGED_NAME).exists()
+
+
+def test_an_uploads_row_that_is_no_utf_8_is_read(tmp_path: Path) -> None:
+    """It is judged by its reader. The defect: an error of the outbox, at each start."""
+    with closing(opened(tmp_path)) as first:
+        first.put_upload("r1", "one")
+    change(tmp_path, "uploads SET row = CAST(x'6fff65' AS TEXT)")
+    with closing(opened(tmp_path)) as again:
+        assert again.uploads() == ["o\ufffde"]
