@@ -46,7 +46,7 @@ def read_cursor(directory: Path) -> Cursor | None:
 
 
 def remove_leftovers(directory: Path) -> None:
-    """Removes what kills have left of cursors that were being written; for the only user of the directory.
+    """Removes the unfinished cursors of bridges that were killed; for the only user of the directory.
 
     Raises:
         OSError: the disk refuses.

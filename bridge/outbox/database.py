@@ -112,7 +112,7 @@ class Database:
         """
         with self._use() as db:
             if (here := _position(db)) != after:
-                raise OutboxError(f"{self._path} was made anew, and begins {_where(here)}")
+                raise OutboxError(f"{self._path} was made anew meanwhile: {_where(here)}")
             for item in items:
                 insert(db, item)
                 meta.count(db, "events", isinstance(item, Event))
@@ -423,7 +423,9 @@ def _position(db: sqlite3.Connection) -> Position | None:
 
 
 def _where(position: Position | None) -> str:
-    return "with what happens now" if position is None else f"after event {position.sequence}"
+    if position is None:
+        return "it begins with the gateway's next event"
+    return f"it goes on after event {position.sequence}"
 
 
 def _pages(db: sqlite3.Connection) -> int:
