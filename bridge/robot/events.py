@@ -38,7 +38,7 @@ class EventReader:
         self._outbox = outbox
         self._disk_failed = False
         self.failures = 0
-        """Streams that have ended, or brought what could not be kept."""
+        """Streams that have ended, or brought what can't be right."""
 
     async def run(self) -> None:
         """Reads; a failure of gateway or disk is tried again for as long as it takes."""
@@ -51,9 +51,10 @@ class EventReader:
             except UserError as error:
                 level = logging.INFO if isinstance(error, GatewayError) else logging.ERROR
                 _log.log(level, "no events from the gateway: %s", explained(error))
+                self.failures += 1
             except FeedError as error:
                 _log.error("no events from the gateway: %s", error)
-            self.failures += 1
+                self.failures += 1
             await backoff.wait()
 
     async def _read(self, backoff: JitteredBackoff) -> None:

@@ -174,9 +174,9 @@ class Retries(_message.Message):
     state: _builtins.int
     """To have the hub take the robot's state, likewise."""
     disk: _builtins.int
-    """To use the outbox: its disk refused."""
+    """To use the outbox: its disk refused, another bridge has it, or it is of a newer version or was made anew."""
     gateway: _builtins.int
-    """To read the gateway's events: the stream ended, or what it brought could not be kept."""
+    """To read the gateway's events: the stream ended, or brought what can't be right."""
     upload: _builtins.int
     """To upload a recording: gateway, hub or store failed."""
     def __init__(
