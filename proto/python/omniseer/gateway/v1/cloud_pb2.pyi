@@ -93,7 +93,7 @@ class CloudStatus(_message.Message):
     outbox_max_bytes: _builtins.int
     """Its limit."""
     events_dropped: _builtins.int
-    """Events dropped because the outbox was full or its disk refused, since the outbox was made."""
+    """Events dropped because the outbox was full, or its disk refused or changed them, since the outbox was made."""
     events_sent: _builtins.int
     """Events that the hub has acknowledged, since the outbox was made."""
     last_sent_age_ms: _builtins.int
