@@ -8,6 +8,7 @@ and until the hub has it: no gateway, no outbox, no uploads, nothing that outliv
 
 import asyncio
 import itertools
+import json
 import secrets
 import ssl
 import sys
@@ -42,12 +43,24 @@ async def publish(server: str, files: Path, robot: str, state: bytes, event: byt
     print("ready", flush=True)
     run, begun_s = secrets.token_hex(8), loop.time()
     for number in itertools.count(1):
-        await hub.request(f"$KV.{names.STATES}.{robot}", state, timeout=_ANSWER_S)
-        await hub.request(names.event_subject(robot, run, number), event, timeout=_ANSWER_S)
+        check_taken((await hub.request(f"$KV.{names.STATES}.{robot}", state, timeout=_ANSWER_S)).data)
+        check_taken(
+            (await hub.request(names.event_subject(robot, run, number), event, timeout=_ANSWER_S)).data
+        )
         done, _ = await asyncio.wait([ended], timeout=max(begun_s + number * _PERIOD_S - loop.time(), 0))
         if done:
             break
     await hub.close()
+
+
+def check_taken(answer: bytes) -> None:
+    """Checks that the hub's answer to a message says that a stream has it.
+
+    Raises:
+        RuntimeError: it says something else.
+    """
+    if "stream" not in json.loads(answer) or "error" in json.loads(answer):
+        raise RuntimeError(f"the hub has not taken a message: {answer.decode(errors='replace')}")
 
 
 if __name__ == "__main__":
