@@ -420,7 +420,8 @@ class Hub:
     async def lasting(self) -> None:
         """Waits for a defect that ends the supervisor, which makes all connections, and raises it.
 
-        A part of each program that runs for long: without it, the program would stay without the hub.
+        A part of bridge, receiver, exporter and `robotctl fleet watch`, which wait for the hub for as long as
+        it takes: without this, they would stay without the hub.
         """
         if self._supervisor is None:
             raise RuntimeError("nothing makes connections to the hub")

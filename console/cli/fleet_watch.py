@@ -70,6 +70,7 @@ class _Watch:
                     tasks.create_task(self._read(self._hub.watch_bucket(STATES), self._board.take_state)),
                     tasks.create_task(self._notice_outages()),
                     tasks.create_task(self._keep_time()),
+                    tasks.create_task(self._hub.lasting()),
                 ]
                 await self._show()
                 for reader in readers:
