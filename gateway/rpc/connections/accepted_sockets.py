@@ -134,8 +134,8 @@ class AcceptedSockets:
         ours = _duplicate(self._descriptors.get(address, _NONE))
         with ExitStack() as stack:
             stack.enter_context(ours)
-            # The number may belong to another socket by now.
-            if _address_of(ours) != address:
+            # The number may belong to another socket by now, of any family.
+            if ours.family not in _FAMILIES or _address_of(ours) != address:
                 raise ConnectionError(address)
             stack.pop_all()
         return ours
