@@ -1,5 +1,6 @@
 """robotctl drive, stop and reset-stop, typed on a real terminal, at a robot of real parts."""
 
+import asyncio
 import functools
 import json
 import signal
@@ -12,13 +13,15 @@ from typing import ParamSpec
 import pytest
 
 from common.errors import ExitCode
-from console.cli.drive_keys import KNOWN_FOR_S
+from console.cli.drive_keys import KNOWN_FOR_S, TAP_S
 from console.cli.loop_signals import ENDING
 from console.gamepad.silence import HELD_FOR_S
-from tests.support.driven_robot import DrivenRobot, drives_undisturbed
+from tests.support.driven_robot import DrivenRobot, drives_undisturbed, free, moving
 from tests.support.kitty import robotctl_on_kitty
+from tests.support.promise import keeps
 from tests.support.robotctl import robotctl, robotctl_process
 from tests.support.terminal import Terminal, robotctl_on_terminal, terminal_with
+from tests.support.undisturbed import DisturbedError, same_worker
 from tests.support.waiting import wait_until
 
 # Timed: on a machine that is busy with other tests, a hold lapses, and only a new one moves the robot again.
@@ -28,6 +31,11 @@ P = ParamSpec("P")
 PLAIN_ANSWER = "\x1b[?62;c"
 W_DOWN, W_REPEATED, W_UP = "\x1b[119;1:1u", "\x1b[119;1:2u", "\x1b[119;1:3u"
 EVENT_TYPES = 2
+LET_GO_S = 0.06
+"""From the end of a hold at the terminal to a zero behind the multiplexer that no motion follows."""
+TIMES = 3
+QUIET_S = 0.7
+"""Longer than any motion may last after that."""
 
 
 def begin(screen: Terminal, answer: str) -> None:
@@ -97,6 +105,52 @@ def test_a_key_moves_the_robot_while_it_is_down_where_the_terminal_reports_that(
         screen.press("\x1b[120;1:1u")
         assert screen.process.wait(20) == 0
         assert "\x1b[<u" in screen.read()
+
+
+@pytest.mark.alone
+def test_a_key_released_in_a_terminal_stops_within_60_ms(robot: DrivenRobot) -> None:
+    def measure() -> float:
+        asyncio.run(free(robot))
+        with same_worker(robot.drive), robotctl_on_kitty("drive", "--target", robot.target) as screen:
+            screen.wait_for("hold w a s d")
+            return max(released_after_s(screen, robot) for _ in range(TIMES))
+
+    keeps(LET_GO_S, "s of motion after a key was released in a terminal", measure)
+
+
+def released_after_s(screen: Terminal, robot: DrivenRobot) -> float:
+    """How long the base moves after the release of a key that was down."""
+    wait_until(lambda: pressed_anew(screen, robot), "the base moves")
+    with moving(robot.base, robot.drive):
+        released_s = time.monotonic()
+        screen.press(W_UP)
+        time.sleep(QUIET_S)
+    return robot.base.stopped_after_s(released_s)
+
+
+@pytest.mark.alone
+def test_a_tap_stops_within_60_ms_after_its_short_hold(robot: DrivenRobot) -> None:
+    def measure() -> float:
+        asyncio.run(free(robot))
+        with same_worker(robot.drive), robotctl_on_terminal("drive", "--target", robot.target) as screen:
+            begin(screen, PLAIN_ANSWER)
+            wait_until(lambda: tap(screen, robot), "the base moves")
+            return max(tapped_after_s(screen, robot) for _ in range(TIMES))
+
+    keeps(TAP_S + LET_GO_S, "s from a press to the end of its motion", measure)
+
+
+def tapped_after_s(screen: Terminal, robot: DrivenRobot) -> float:
+    """How long after the press of a key, of which no release is reported, the base moves."""
+    at_rest(robot)
+    time.sleep(QUIET_S)  # It has come to its end: only then does the next press begin a motion of its own.
+    before = len(robot.base.heard)
+    pressed_s = time.monotonic()
+    screen.press("w")
+    time.sleep(TAP_S + QUIET_S)
+    if not any(each.moves for each in robot.base.heard[before:]):
+        raise DisturbedError("the press was over before the robot could follow it")
+    return robot.base.stopped_after_s(pressed_s)
 
 
 @driven
