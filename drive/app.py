@@ -27,10 +27,14 @@ _log = logging.getLogger(__name__)
 _WORKER_PRIORITY: Final = 10
 _GUARD_PRIORITY: Final = 11
 """Above the worker's, which it has to end."""
+_ENDING: Final = (signal.SIGTERM, signal.SIGINT, signal.SIGQUIT, signal.SIGHUP)
+"""What ends the guard, and so the worker: a service manager, Ctrl-C, Ctrl-\\, a terminal that is closed."""
+_FREEZING: Final = (signal.SIGTSTP, signal.SIGTTOU)
+"""From a terminal, to both processes at once: Ctrl-Z, and what is written by a program in the background."""
 
 
 def serve(settings: DriveSettings, config_file: Path | None) -> int:
-    """Runs the guard until SIGTERM or SIGINT; returns the exit code.
+    """Runs the guard until a signal ends it; returns the exit code.
 
     Raises:
         UserError: ROS 2 or the state directory can't be used.
@@ -44,8 +48,7 @@ def serve(settings: DriveSettings, config_file: Path | None) -> int:
     with ros_node(OwnNode.DRIVE_GUARD) as node:
         velocities = VelocityPublisher(node, settings.outputs)
         guard = Guard(command, velocities, settings.on_loss, stop_file, read_stops(path))
-        for number in (signal.SIGTERM, signal.SIGINT):
-            signal.signal(number, lambda *_: guard.stop())
+        _take_signals(guard)
         raise_priority(_GUARD_PRIORITY)
         lock_memory()
         # What lives now stays: a collection that looks at all of it may outlast the guard's patience.
@@ -54,6 +57,16 @@ def serve(settings: DriveSettings, config_file: Path | None) -> int:
         code = guard.run()
     stop_file.close()
     return code
+
+
+def _take_signals(guard: Guard) -> None:
+    """Has signals end the guard in order. Nothing a terminal sends ends or freezes both processes at once."""
+    for number in _ENDING:
+        # nohup has this one ignored, so that the program outlives its terminal.
+        if number is not signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, lambda *_: guard.stop())
+    for number in _FREEZING:
+        signal.signal(number, signal.SIG_IGN)  # In the worker as well, which inherits that.
 
 
 def work(settings: DriveSettings) -> None:
@@ -84,9 +97,9 @@ def work(settings: DriveSettings) -> None:
         def stop(_number: int, _frame: FrameType | None) -> None:
             worker.stopping = True
 
-        # A terminal sends SIGINT to the worker, too; the guard decides.
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        signal.signal(signal.SIGTERM, stop)
+        # A terminal sends the others to the worker, too; the guard decides.
+        for number in _ENDING:
+            signal.signal(number, stop if number is signal.SIGTERM else signal.SIG_IGN)
         raise_priority(_WORKER_PRIORITY)
         lock_memory()
         _log.info("listening on %s", settings.socket)

@@ -1,15 +1,13 @@
-"""Old commands, other sources, a missing base, and every way that driving ends."""
+"""Old commands, other sources, a missing base, and a log that nothing reads."""
 
 import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from contextlib import nullcontext, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import psutil
 import pytest
@@ -256,102 +254,6 @@ def test_a_reset_waits_until_a_source_that_moved_the_robot_can_be_heard(robot: D
             robot.phase_is("AVAILABLE")
 
     undisturbed(attempt)
-
-
-def _send(**line: Any) -> Callable[[Driving], None]:
-    def send(robot: Driving) -> None:
-        assert robot.peer
-        robot.peer.send(**line)
-
-    return send
-
-
-def _signal(who: str, number: signal.Signals) -> Callable[[Driving], None]:
-    def send(robot: Driving) -> None:
-        assert robot.guard
-        assert robot.peer
-        pid = {"gateway": robot.peer.process.pid, "worker": robot.worker.pid, "guard": robot.guard.pid}[who]
-        os.kill(pid, number)
-        if who == "guard":
-            robot.guard.wait(10)
-
-    return send
-
-
-ENDINGS = {
-    "released": _send(held=False),
-    "stopped": _send(stop="ben"),
-    "disabled": _send(enabled=False),
-    "closed": _send(end="CLOSED"),
-    "access ended": _send(end="ACCESS_ENDED"),
-    "taken over": _send(lease="ben"),
-    "gateway killed": _signal("gateway", signal.SIGKILL),
-    "gateway frozen": _signal("gateway", signal.SIGSTOP),
-    "worker killed": _signal("worker", signal.SIGKILL),
-    "worker frozen": _signal("worker", signal.SIGSTOP),
-    "worker terminated": _signal("worker", signal.SIGTERM),
-    "ended": _signal("guard", signal.SIGTERM),
-    "interrupted": _signal("guard", signal.SIGINT),
-    "guard killed": _signal("guard", signal.SIGKILL),
-}
-LOSING = frozenset(ENDINGS) & {
-    "worker killed",
-    "worker frozen",
-    "worker terminated",
-    "ended",
-    "interrupted",
-    "guard killed",
-}
-"""Endings, also those below, that end the worker."""
-
-
-@pytest.mark.parametrize("ending", ENDINGS)
-def test_whatever_ends_it_the_last_message_is_zero(robot: Driving, ending: str) -> None:
-    def attempt() -> None:
-        robot.drive()
-        with robot.moving(loses_worker=ending in LOSING):
-            ENDINGS[ending](robot)
-        # Of a stall this holds as well: nothing here is excused by one.
-        wait_until(lambda: not robot.witness.moves(), "the last message is zero")
-        robot.settled()
-        assert not robot.witness.moves()
-
-    undisturbed(attempt)
-
-
-LOSSES = {
-    "gateway killed": (_signal("gateway", signal.SIGKILL), "stopped by anna: the driver was lost"),
-    "worker killed": (_signal("worker", signal.SIGKILL), "robot-drive lost its worker"),
-    "worker frozen": (_signal("worker", signal.SIGSTOP), "robot-drive lost its worker"),
-    "ended": (_signal("guard", signal.SIGTERM), "robot-drive was ended"),
-    "guard killed": (_signal("guard", signal.SIGKILL), "robot-drive was ended"),
-}
-
-
-@pytest.mark.parametrize("loss", LOSSES)
-def test_a_motion_that_no_gateway_has_recorded_outlives_the_program(robot: Driving, loss: str) -> None:
-    lose, why = LOSSES[loss]
-
-    def attempt() -> int:
-        robot.drive()
-        with robot.moving(loses_worker=loss in LOSING):
-            started_ns = robot.state().episode.started_ns
-            lose(robot)
-            robot.settled()
-        return started_ns
-
-    started_ns = undisturbed(attempt)
-    assert robot.guard
-    if robot.guard.poll() is not None:
-        wait_until(lambda: robot.observer.state() is None, "the drive program has gone")
-        robot.start()
-    episode = wait_until(
-        lambda: episode if (episode := robot.state().episode).ended_ns else None, "the end of the motion", 30
-    )
-    assert (episode.holder, episode.started_ns, episode.recorded) == ("anna", started_ns, False)
-    assert episode.ended_by.startswith(why)
-    assert 0 < episode.distance_m < 1
-    assert 0 < (episode.ended_ns - episode.started_ns) / 1e9 < 60
 
 
 def test_a_terminal_that_reads_nothing_keeps_no_zero_back(tmp_path: Path, ros_domain: int) -> None:  # noqa: ARG001
