@@ -60,6 +60,9 @@ class Commands:
         """Whether the driver has released since the last command was made; it is then no hold in any case."""
         self._released = True
         """Whether a command that is no hold has left since the last hold: only then a new one begins."""
+        self._release = 0
+        """The first command that is no hold after the last that was one."""
+        self._ended = False
         self.sequence = 0
         self.holds = False
 
@@ -93,9 +96,9 @@ class Commands:
         self._hold = None
         return held
 
-    def end_hold(self) -> None:
-        """Ends a hold without the driver: the session ends."""
-        self._hold = None
+    def end(self) -> None:
+        """Ends the holds, for good: the session ends. Another thread may hold on until it knows."""
+        self._ended, self._hold = True, None
 
     def make(self, now_s: float, robot_clock: RobotClock, picture_ns: int) -> DriveCommand:
         """Returns the next command.
@@ -106,10 +109,10 @@ class Commands:
             picture_ns: When the picture that the driver sees was captured, on the robot's clock; 0: none.
         """
         hold = self._hold
-        if self._let_go or self._lapsed or self._unrenewed(now_s):
+        if self._ended or self._let_go or self._lapsed or self._unrenewed(now_s):
             self._let_go, hold = False, None
         if hold is None and self.holds:
-            self._released = False
+            self._released, self._release = False, self.sequence + 1
         if hold and not self.holds and not self._released:
             # The release before it has not left yet; without it this would be the same hold, going on.
             hold = None
@@ -127,9 +130,9 @@ class Commands:
             input_device=hold.input_device if hold else self._input_device,
         )
 
-    def left(self, *, held: bool) -> None:
-        """Notes that a command has left on a lane."""
-        self._released = self._released or not held
+    def left(self, sequence: int, *, held: bool) -> None:
+        """Notes that a command has left on a lane, which may be slower than another one."""
+        self._released = self._released or (not held and sequence >= self._release)
 
     def _unrenewed(self, now_s: float) -> bool:
         """Whether there is a hold, and it counts no more."""

@@ -98,7 +98,7 @@ class DriveSession:
     ) -> None:
         """Releases, and closes the session when the release is on its way."""
         self._ending = True
-        self._commands.end_hold()
+        self._commands.end()
         try:
             self._lanes.send(self._next_command(last=True))
             await self._changes.wait_until(lambda: self._lanes.open_count == 0, _FAREWELL_S)
@@ -295,9 +295,9 @@ class _Robot:
 
     def left(self, command: Outgoing) -> None:
         """Takes note of a command that has left on a lane."""
-        self._commands.left(held=command.held)
+        self._commands.left(command.sequence, held=command.held)
 
     def lost(self, error: GatewayError) -> None:
         """Ends the hold: the session has ended."""
         self.error = error
-        self._commands.end_hold()
+        self._commands.end()

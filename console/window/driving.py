@@ -80,6 +80,7 @@ class Driving(QObject):
     def toggle(self) -> None:
         """Begins driving by the picture, or ends driving."""
         if self._driver.view().open:
+            self.hands.release()
             self._driver.end()
         else:
             self.begin(Supervision.PICTURE, False)

@@ -182,6 +182,21 @@ def test_a_key_moves_the_robot_while_it_is_down(seat: Seat) -> None:
     until(lambda: not seat.robot.teleop.holder, "the lease is given back")
 
 
+@seated
+def test_the_end_of_driving_releases_what_is_down(seat: Seat, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Until the session has ended, the window would hold anew with each tick."""
+    seat.ready()
+    seat.key(Qt.Key.Key_W, down=True)
+    seat.moves()
+    held: list[object] = []
+    monkeypatch.setattr(seat.window._worker.driver, "hold", lambda *how: held.append(how))
+    press(seat.window, Qt.Key.Key_T)
+    seat.window.driving.hands._tick()
+    seat.key(Qt.Key.Key_W, down=False)
+    until(lambda: not seat.robot.teleop.holder, "the lease is given back")
+    assert not held
+
+
 PLACE = 26
 """Of E on a keyboard of a PC under X11."""
 EURO_SIGN, CYRILLIC_U = Qt.Key(0x20AC), Qt.Key(0x0423)

@@ -35,7 +35,7 @@ class Driver:
         self.now_s += after_s
         command = self.commands.make(self.now_s, self.robot_clock, 0)
         if not self.stuck:
-            self.commands.left(held=command.held)
+            self.commands.left(command.sequence, held=command.held)
         return command.held
 
 
@@ -98,6 +98,32 @@ def test_no_hold_begins_before_the_release_has_left(driver: Driver) -> None:
     assert not driver.next_holds()
     driver.hold()
     assert driver.next_holds()
+
+
+def test_a_command_that_leaves_late_is_no_release_of_a_later_hold(driver: Driver) -> None:
+    """One lane may be slower than the others, by as much as the network holds it up."""
+    late = driver.commands.make(driver.now_s, driver.robot_clock, 0)
+    driver.hold()
+    assert driver.next_holds()
+    driver.stuck = True
+    driver.commands.release()
+    assert not driver.next_holds()
+    driver.commands.left(late.sequence, held=late.held)
+    driver.hold()
+    assert not driver.next_holds(), "the release has not left"
+
+
+def test_no_hold_counts_once_the_session_ends(driver: Driver) -> None:
+    """A window's thread holds on until it knows; the last command of all has to be a release."""
+    driver.hold()
+    assert driver.next_holds()
+    driver.commands.end()
+    driver.hold()
+    assert not driver.next_holds()
+    driver.commands.release()
+    driver.hold()
+    assert not driver.next_holds()
+    assert not driver.next_holds()
 
 
 @pytest.mark.parametrize("number", [float("nan"), float("inf"), float("-inf")])

@@ -127,7 +127,7 @@ class Drive:
             for line, on_their_way in zip(self.up, self.on_their_way, strict=True):
                 if on_their_way.has_room(held=command.held):
                     on_their_way.add(command.sequence, held=command.held)
-                    self.commands.left(held=command.held)
+                    self.commands.left(command.sequence, held=command.held)
                     self.at(line.arrival_s(now_s), partial(self.take_command, command))
         self.at(now_s + COMMAND_EVERY_S, self.send_command)
 
