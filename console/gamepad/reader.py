@@ -16,7 +16,8 @@ from console.steering import Steering
 PERIOD_S: Final = 0.008
 """Between two readings: that of a USB gamepad (125 Hz)."""
 READING_COUNTS_S: Final = 0.1
-"""An older reading is a release: the thread hangs in a device."""
+"""An older reading is a release: the thread hangs in a device. When it goes on, what is held has to be held
+anew: no recovery of a device moves the robot."""
 _END_S: Final = 1.0
 
 
@@ -112,6 +113,8 @@ class GamepadReader:
     def _take(self, pad: PadInput | None, name: str) -> None:
         now_s = time.monotonic()
         with self._lock:
+            if now_s - self._newest.at_s > READING_COUNTS_S:
+                self._hands.forget()
             self._hands.take(pad)
             silent = self._silence.take(pad, now_s)
             ended = silent and (self._hands.steering is not None or self._newest.silent)
