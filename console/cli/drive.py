@@ -162,8 +162,7 @@ class _Cockpit:
         keyboard.take()
         try:
             with handled(dict.fromkeys(ENDING, self._end)):
-                async with drive_terminal.reporting_keys(keyboard) as liveness:
-                    hands = Hands(releases=liveness is not None, liveness=liveness)
+                async with drive_terminal.reporting_keys(keyboard) as hands:
                     with drive_terminal.reading(keyboard, lambda typed: self._take(typed, hands)):
                         await self._drive(hands)
         finally:
@@ -182,8 +181,8 @@ class _Cockpit:
                 if self._controls.take_stop():
                     hands.release()
                     self._call(self._stop("by the driver's gamepad"))
-                if hands.ask(time.monotonic()):
-                    drive_terminal.ask()
+                if request := hands.ask(time.monotonic()):
+                    drive_terminal.ask(request)
                 self._hold(hands)
                 if ticks % _DRAW_EVERY == 0:
                     self._show(hands)

@@ -3,7 +3,8 @@
 Most terminals report that a key was pressed, and never that it was released: there each press moves the robot
 for a moment (TAP_S), and a key that is held repeats. Terminals with the kitty keyboard protocol
 (https://sw.kovidgoyal.net/kitty/keyboard-protocol) report releases: there a key moves the robot as long as it
-is down and the terminal answers: one that is frozen or cut off reports no release.
+is down. Either counts only as long as the terminal answers: one that is frozen or cut off reports no release,
+and what it reports when it goes on may be as old as that.
 """
 
 import math
@@ -19,13 +20,15 @@ second), and short of the delay before the first."""
 ASK_EVERY_S: Final = 0.1
 """Between two requests for a sign of life."""
 KNOWN_FOR_S: Final = 0.5
-"""How long a key counts as down after the newest request that the terminal has answered. Beyond ASK_EVERY_S
-and the round trips of most networks."""
+"""How long a key counts after the newest request that the terminal has answered. Beyond ASK_EVERY_S and the
+round trips of most networks."""
 
-ASK: Final = "\x1b[?u"
+ASK_FLAGS: Final = "\x1b[?u"
 """Requests the protocol's flags that are in force."""
-ASK_ALL: Final = f"{ASK}\x1b[c"
-"""Requests the flags, and then what every terminal answers (DA1), so that silence is an answer."""
+ASK_ATTRIBUTES: Final = "\x1b[c"
+"""Requests what every terminal answers (DA1)."""
+ASK_ALL: Final = ASK_FLAGS + ASK_ATTRIBUTES
+"""The second, so that silence is an answer to the first."""
 RELEASES_BEGIN: Final = "\x1b[>15u"
 """Escape codes for all keys, with their releases and their places on the keyboard (1 + 2 + 4 + 8)."""
 RELEASES_END: Final = "\x1b[<u"
@@ -95,33 +98,42 @@ def report_releases(flags: int | None) -> bool:
 
 
 class Liveness:
-    """Until when the keys are known: a terminal that is frozen or cut off reports no release.
+    """Until when the keys are known: a terminal that is frozen or cut off reports no release, and no press.
 
-    It is asked for its flags again and again, one request at a time. Its answer comes after the keys'
-    events from before: it makes them known as of the moment when the request was sent, however late it is.
+    It is asked again and again, one request at a time: for its flags if it reports releases, else for its
+    attributes. Its answer comes after the keys' events from before: it makes them known as of the moment when
+    the request was sent, however late it is.
 
     Args:
         now_s: When the terminal has answered last.
+        releases: Whether it reports releases.
     """
 
-    def __init__(self, now_s: float) -> None:
+    def __init__(self, now_s: float, *, releases: bool = True) -> None:
+        self._releases = releases
         self._known_s = now_s
         self._asked_s: float | None = None
         """When the request was sent that is not answered yet."""
         self._ask_s = now_s
         """When the next one is due."""
 
-    def ask(self, now_s: float) -> bool:
-        """Returns whether a request is to be sent now."""
-        if self._asked_s is not None or now_s < self._ask_s:
-            return False
-        self._asked_s, self._ask_s = now_s, now_s + ASK_EVERY_S
-        return True
+    @property
+    def awaited(self) -> bool:
+        """Whether an answer is due."""
+        return self._asked_s is not None
 
-    def take(self, flags: int) -> None:
-        """Takes an answer. Without the flags for releases nothing is known."""
-        if self._asked_s is not None:
-            self._known_s = self._asked_s if report_releases(flags) else -math.inf
+    def ask(self, now_s: float) -> str:
+        """Returns the request that is to be sent now; empty for none."""
+        if self._asked_s is not None or now_s < self._ask_s:
+            return ""
+        self._asked_s, self._ask_s = now_s, now_s + ASK_EVERY_S
+        return ASK_FLAGS if self._releases else ASK_ATTRIBUTES
+
+    def take(self, flags: int | None) -> None:
+        """Takes an answer, None for its attributes. Without the flags for releases nothing is known."""
+        if self._asked_s is not None and self._releases == (flags is not None):
+            known = flags is None or report_releases(flags)
+            self._known_s = self._asked_s if known else -math.inf
             self._asked_s = None
 
     def lasts(self, now_s: float) -> bool:
@@ -134,11 +146,11 @@ class Hands:
 
     Args:
         releases: Whether the terminal reports releases.
-        liveness: Of a terminal that does; is given its answers.
+        liveness: Of the terminal, and is given its answers; None for one that never answers.
     """
 
     def __init__(self, *, releases: bool, liveness: Liveness | None = None) -> None:
-        self._releases = releases
+        self.releases = releases
         self._liveness = liveness
         self._down: dict[str, Direction] = {}
         """By the place on the keyboard: what a key means may change before it is released."""
@@ -154,7 +166,8 @@ class Hands:
         actions = []
         for found in _SEQUENCE.finditer(typed[: len(typed) - len(self._unfinished)]):
             action = self._take(found, now_s)
-            if action:
+            # A reset that was held up would be of the stop that is shown now, which may be another one.
+            if action and (action is not Action.RESET or self.answers(now_s)):
                 actions.append(action)
         return actions
 
@@ -167,15 +180,22 @@ class Hands:
         """Returns what the keys that are down amount to; None with no key down."""
         if not self.answers(now_s):
             self._down.clear()
+            if not self.releases:
+                self._taps.clear()  # Held up on their way, it is not known for how long.
         self._taps = {key: at_s for key, at_s in self._taps.items() if now_s - at_s < TAP_S}
         return steering_of({*self._down.values(), *self._taps})
 
-    def ask(self, now_s: float) -> bool:
-        """Returns whether a sign of life is to be requested now (ASK)."""
-        return self._liveness is not None and self._liveness.ask(now_s)
+    @property
+    def awaits_answer(self) -> bool:
+        """Whether the terminal has yet to give a sign of life that was requested."""
+        return self._liveness is not None and self._liveness.awaited
+
+    def ask(self, now_s: float) -> str:
+        """Returns the request for a sign of life that is to be sent now; empty for none."""
+        return self._liveness.ask(now_s) if self._liveness else ""
 
     def answers(self, now_s: float) -> bool:
-        """Returns whether the terminal answers, so that a key that is down counts."""
+        """Returns whether the terminal answers, so that its keys count."""
         return self._liveness is None or self._liveness.lasts(now_s)
 
     def _take(self, found: "re.Match[str]", now_s: float) -> Action | None:
@@ -213,7 +233,9 @@ class Hands:
         return _action(character, event, modifiers)
 
     def _answer(self, parameters: str, final: str) -> None:
-        if final == "u" and parameters.isdigit() and self._liveness:
+        if self._liveness and final == "c":
+            self._liveness.take(None)
+        elif self._liveness and final == "u" and parameters.isdigit():
             self._liveness.take(int(parameters))
 
     def _steer(
@@ -226,7 +248,7 @@ class Hands:
                 self._taps.pop(direction, None)
         elif direction is None or modifiers & _COMMANDING:
             return
-        elif not self._releases:
+        elif not self.releases:
             self._tap(direction, now_s)
         elif event in _PRESSED:
             self._down[place] = direction

@@ -11,7 +11,7 @@ from contextlib import ExitStack, asynccontextmanager, contextmanager, suppress
 from typing import Final
 
 from console.cli import drive_keys
-from console.cli.drive_keys import Liveness
+from console.cli.drive_keys import Hands, Liveness
 from console.cli.keyboard import Keyboard
 
 _ANSWER_WITHIN_S: Final = 0.2
@@ -19,16 +19,20 @@ _ANSWER_WITHIN_S: Final = 0.2
 
 
 @asynccontextmanager
-async def reporting_keys(keyboard: Keyboard) -> AsyncIterator[Liveness | None]:
+async def reporting_keys(keyboard: Keyboard) -> AsyncIterator[Hands]:
     """Makes the terminal report releases, where it can, and its focus, while the block lasts.
 
-    Yields whether it still answers; None for a terminal that does not report releases.
+    Yields the hands on its keys.
     """
-    with ExitStack() as modes:
-        liveness = await _report_releases(keyboard, modes)
-        _write(drive_keys.FOCUS_BEGIN)
-        modes.callback(_write, drive_keys.FOCUS_END)
-        yield liveness
+    hands = Hands(releases=False)
+    try:
+        with ExitStack() as modes:
+            hands = await _hands(keyboard, modes)
+            _write(drive_keys.FOCUS_BEGIN)
+            modes.callback(_write, drive_keys.FOCUS_END)
+            yield hands
+    finally:
+        await _take_last_answer(keyboard, hands)
 
 
 @contextmanager
@@ -42,45 +46,66 @@ def reading(keyboard: Keyboard, take: Callable[[str | None], None]) -> Iterator[
         loop.remove_reader(keyboard.fileno)
 
 
-def ask() -> None:
+def ask(request: str) -> None:
     """Requests a sign of life; its answer is typed."""
-    _write(drive_keys.ASK)
+    _write(request)
 
 
-async def _report_releases(keyboard: Keyboard, modes: ExitStack) -> Liveness | None:
-    """Makes it report releases until the modes are left, and say that it does: some have the rest alone."""
-    if drive_keys.flags_in(await _answer(keyboard)) is None:
-        return None
-    with ExitStack() as begun:
-        _write(drive_keys.RELEASES_BEGIN)
-        begun.callback(_write, drive_keys.RELEASES_END)
-        asked_s = time.monotonic()
-        if not drive_keys.report_releases(drive_keys.flags_in(await _answer(keyboard))):
-            return None
-        modes.push(begun.pop_all())
-        return Liveness(asked_s)
+async def _hands(keyboard: Keyboard, modes: ExitStack) -> Hands:
+    """Makes it report releases until the modes are left, and say that it does: some have the rest alone.
+
+    Presses alone have a liveness, too, if all that was requested was answered in time.
+    """
+    asked_s = time.monotonic()
+    answer = await _answer(keyboard)
+    if drive_keys.flags_in(answer) is not None:
+        with ExitStack() as begun:
+            _write(drive_keys.RELEASES_BEGIN)
+            begun.callback(_write, drive_keys.RELEASES_END)
+            asked_s = time.monotonic()
+            answer = await _answer(keyboard)
+            if drive_keys.report_releases(drive_keys.flags_in(answer)):
+                modes.push(begun.pop_all())
+                return Hands(releases=True, liveness=Liveness(asked_s))
+    return Hands(releases=False, liveness=Liveness(asked_s, releases=False) if answer else None)
 
 
 async def _answer(keyboard: Keyboard) -> str:
     """Returns what the terminal answers to ASK_ALL; nothing unless all of it comes in time."""
+    until_s = asyncio.get_running_loop().time() + _ANSWER_WITHIN_S
     _write(drive_keys.ASK_ALL)
-    answer, loop = "", asyncio.get_running_loop()
-    until_s = loop.time() + _ANSWER_WITHIN_S
+    answer = ""
     while not drive_keys.is_complete(answer):
-        readable = loop.create_future()
-        loop.add_reader(keyboard.fileno, _wake, readable)
-        try:
-            async with asyncio.timeout_at(until_s):
-                await readable
-        except TimeoutError:
-            return ""
-        finally:
-            loop.remove_reader(keyboard.fileno)
-        typed = keyboard.typed()
+        typed = await _typed(keyboard, until_s)
         if typed is None:
             return ""
         answer += typed
     return answer
+
+
+async def _take_last_answer(keyboard: Keyboard, hands: Hands) -> None:
+    """Waits for an answer that is on its way, which would be typed in the shell; not for long."""
+    until_s = asyncio.get_running_loop().time() + _ANSWER_WITHIN_S
+    while hands.awaits_answer:
+        typed = await _typed(keyboard, until_s)
+        if typed is None:
+            return
+        hands.take(typed, time.monotonic())
+
+
+async def _typed(keyboard: Keyboard, until_s: float) -> str | None:
+    """Returns what is typed until an instant of the loop; None if nothing is, or the terminal is gone."""
+    loop = asyncio.get_running_loop()
+    readable = loop.create_future()
+    loop.add_reader(keyboard.fileno, _wake, readable)
+    try:
+        async with asyncio.timeout_at(until_s):
+            await readable
+    except TimeoutError:
+        return None
+    finally:
+        loop.remove_reader(keyboard.fileno)
+    return keyboard.typed()
 
 
 def _wake(readable: "asyncio.Future[None]") -> None:

@@ -20,10 +20,11 @@ class Kitty:
 
     Args:
         knows: the flags that it has; others it ignores.
+        speaks: whether it has the protocol; without it answers what every terminal does.
     """
 
-    def __init__(self, knows: int = ALL_FLAGS) -> None:
-        self.knows = knows
+    def __init__(self, knows: int = ALL_FLAGS, *, speaks: bool = True) -> None:
+        self.knows, self.speaks = knows, speaks
         self.pushed: list[int] = []
         self._written = ""
 
@@ -38,6 +39,8 @@ class Kitty:
         answers, end = [], 0
         for request in _REQUEST.finditer(self._written):
             end = request.end()
+            if not self.speaks and not request["attributes"]:
+                continue
             if request["pushed"]:
                 self.pushed.append(int(request["pushed"]))
             elif request["popped"]:
@@ -54,12 +57,15 @@ class KittyTerminal(Terminal):
     Args:
         command: the program.
         knows: as `Kitty`.
+        speaks: as `Kitty`.
         options: as `Terminal`.
     """
 
-    def __init__(self, command: list[str], *, knows: int = ALL_FLAGS, **options: Any) -> None:
+    def __init__(
+        self, command: list[str], *, knows: int = ALL_FLAGS, speaks: bool = True, **options: Any
+    ) -> None:
         super().__init__(command, **options)
-        self.kitty = Kitty(knows)
+        self.kitty = Kitty(knows, speaks=speaks)
         self._lock = threading.Lock()
         self._answered = 0
         self._thawed, self._ending = threading.Event(), threading.Event()
@@ -99,10 +105,17 @@ class KittyTerminal(Terminal):
 
 
 @contextmanager
-def robotctl_on_kitty(*words: str, **options: Any) -> Iterator[KittyTerminal]:
-    """The operator's program on such a terminal; options as `KittyTerminal`."""
-    screen = KittyTerminal([str(ROBOTCTL), *words], **options)
+def kitty_with(command: list[str], **options: Any) -> Iterator[KittyTerminal]:
+    """Any program on such a terminal, gone when the block ends; options as `KittyTerminal`."""
+    screen = KittyTerminal(command, **options)
     try:
         yield screen
     finally:
         screen.close()
+
+
+@contextmanager
+def robotctl_on_kitty(*words: str, **options: Any) -> Iterator[KittyTerminal]:
+    """The operator's program on such a terminal; options as `KittyTerminal`."""
+    with kitty_with([str(ROBOTCTL), *words], **options) as screen:
+        yield screen

@@ -17,8 +17,8 @@ from omniseer.gateway.v1.robot_gateway_pb2 import SubscribeEventsResponse, Watch
 from tests.support.control_characters import CONTROL_CHARACTERS, change_texts
 from tests.support.filled import fields_of, fill
 from tests.support.gateway_double import GatewayDouble, serving
+from tests.support.kitty import robotctl_on_kitty
 from tests.support.robotctl import robotctl, robotctl_process
-from tests.support.terminal import robotctl_on_terminal
 
 NEVER = set(CONTROL_CHARACTERS) - {"\n"}
 LATEST = 2**63 - 1
@@ -27,7 +27,6 @@ ARMED_AFTER = 50
 HOSTILE = f"{CONTROL_CHARACTERS}\x1b]52;c;cm0gLXJm\x07"
 OURS = re.compile(r"\x1b\[(?:2K|\?1004[hl]|\?u|c)|\r\n|\r(?=\x1b\[2K)|\r$")
 """What robotctl itself has a terminal do: draw a line anew, report its focus, say which keys it reports."""
-PLAIN_ANSWER = "\x1b[?62;c"
 
 
 class HostileRobot(GatewayDouble):
@@ -156,9 +155,7 @@ def test_a_copy_of_a_hostile_recording_is_refused_in_text(
 @pytest.mark.parametrize("form", [(), ("--json",)], ids=["line", "json"])
 def test_nothing_else_reaches_it_while_driving(target: str, form: tuple[str, ...]) -> None:
     """Who stopped the robot and why is shown, and later how it confirms the driver's own stop."""
-    with robotctl_on_terminal("drive", "--target", target, *form, columns=1000) as screen:
-        screen.wait_for("\x1b[?u")
-        screen.press(PLAIN_ANSWER)
+    with robotctl_on_kitty("drive", "--target", target, *form, speaks=False, columns=1000) as screen:
         begun = screen.wait_for("stopped")
         begun = screen.wait_for("armed", after=begun)
         screen.press(" ")

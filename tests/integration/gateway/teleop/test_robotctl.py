@@ -17,10 +17,10 @@ from console.cli.drive_keys import KNOWN_FOR_S, TAP_S
 from console.cli.loop_signals import ENDING
 from console.gamepad.silence import HELD_FOR_S
 from tests.support.driven_robot import DrivenRobot, drives_undisturbed, free, moving
-from tests.support.kitty import robotctl_on_kitty
+from tests.support.kitty import KittyTerminal, kitty_with, robotctl_on_kitty
 from tests.support.promise import keeps
 from tests.support.robotctl import robotctl, robotctl_process
-from tests.support.terminal import Terminal, robotctl_on_terminal, terminal_with
+from tests.support.terminal import Terminal
 from tests.support.undisturbed import DisturbedError, same_worker
 from tests.support.waiting import wait_until
 
@@ -28,7 +28,6 @@ from tests.support.waiting import wait_until
 pytestmark = [pytest.mark.ros, pytest.mark.timed]
 P = ParamSpec("P")
 
-PLAIN_ANSWER = "\x1b[?62;c"
 W_DOWN, W_REPEATED, W_UP = "\x1b[119;1:1u", "\x1b[119;1:2u", "\x1b[119;1:3u"
 EVENT_TYPES = 2
 LET_GO_S = 0.06
@@ -38,11 +37,12 @@ QUIET_S = 0.7
 """Longer than any motion may last after that."""
 
 
-def begin(screen: Terminal, answer: str) -> None:
-    """Answers as the terminal, and waits until the robot may be driven."""
-    screen.wait_for("\x1b[?u")
-    screen.press(answer)
-    screen.wait_for("hold w a s d")
+@contextmanager
+def robotctl_on_plain(*words: str) -> Iterator[KittyTerminal]:
+    """The operator's program on a terminal that does not speak the protocol; ready to be driven with."""
+    with robotctl_on_kitty(*words, speaks=False) as screen:
+        screen.wait_for("hold w a s d")
+        yield screen
 
 
 def driven(test: Callable[P, None]) -> Callable[P, None]:
@@ -63,8 +63,7 @@ def at_rest(robot: DrivenRobot) -> None:
 
 @driven
 def test_a_tap_moves_the_robot_for_a_moment(robot: DrivenRobot) -> None:
-    with robotctl_on_terminal("drive", "--target", robot.target, "--speed", "0.1") as screen:
-        begin(screen, PLAIN_ANSWER)
+    with robotctl_on_plain("drive", "--target", robot.target, "--speed", "0.1") as screen:
         before = len(screen.read())
         # The line is drawn several times a second: on a busy machine a tap may be over in between.
         wait_until(
@@ -132,8 +131,7 @@ def released_after_s(screen: Terminal, robot: DrivenRobot) -> float:
 def test_a_tap_stops_within_60_ms_after_its_short_hold(robot: DrivenRobot) -> None:
     def measure() -> float:
         asyncio.run(free(robot))
-        with same_worker(robot.drive), robotctl_on_terminal("drive", "--target", robot.target) as screen:
-            begin(screen, PLAIN_ANSWER)
+        with same_worker(robot.drive), robotctl_on_plain("drive", "--target", robot.target) as screen:
             wait_until(lambda: tap(screen, robot), "the base moves")
             return max(tapped_after_s(screen, robot) for _ in range(TIMES))
 
@@ -174,6 +172,25 @@ def test_a_terminal_that_freezes_releases_its_keys(robot: DrivenRobot) -> None:
         assert screen.process.wait(20) == 0
 
 
+@driven
+def test_presses_that_are_held_up_on_their_way_move_nothing(robot: DrivenRobot) -> None:
+    """As after a gap of an SSH connection: what was pressed in it comes at once, however old it is."""
+    with robotctl_on_plain("drive", "--target", robot.target, "--speed", "0.1") as screen:
+        wait_until(lambda: tap(screen, robot), "the base moves")
+        at_rest(robot)
+        screen.freeze()
+        screen.wait_for("the terminal does not answer", after=len(screen.read()))
+        before = len(robot.base.heard)
+        screen.press("www")
+        time.sleep(TAP_S)
+        screen.thaw()
+        time.sleep(TAP_S)
+        assert not any(each.moves for each in robot.base.heard[before:])
+        wait_until(lambda: tap(screen, robot), "a press of now moves it")
+        screen.press("x")
+        assert screen.process.wait(20) == 0
+
+
 @pytest.mark.parametrize("knows", [0, 1, 13], ids=["nothing", "escape codes", "all but releases"])
 @driven
 def test_a_terminal_that_speaks_the_protocol_without_releases_is_one_of_taps(
@@ -206,8 +223,7 @@ def test_a_signal_leaves_the_terminal_as_it_was(robot: DrivenRobot, number: sign
 
 @driven
 def test_space_stops_and_the_stop_is_reset_by_its_number(robot: DrivenRobot) -> None:
-    with robotctl_on_terminal("drive", "--target", robot.target) as screen:
-        begin(screen, PLAIN_ANSWER)
+    with robotctl_on_plain("drive", "--target", robot.target) as screen:
         screen.press(" ")
         screen.wait_for("stopped")
         screen.press("r")
@@ -231,8 +247,7 @@ def test_space_stops_and_the_stop_is_reset_by_its_number(robot: DrivenRobot) -> 
 @driven
 def test_driving_is_disabled_without_a_terminal_and_enabled_again(robot: DrivenRobot) -> None:
     try:
-        with robotctl_on_terminal("drive", "--target", robot.target) as screen:
-            begin(screen, PLAIN_ANSWER)
+        with robotctl_on_plain("drive", "--target", robot.target) as screen:
             disabled = robotctl("drive", "--disable", "--target", robot.target, "--json")
             assert disabled.returncode == 0, disabled.stderr
             document = json.loads(disabled.stdout)
@@ -242,8 +257,7 @@ def test_driving_is_disabled_without_a_terminal_and_enabled_again(robot: DrivenR
         again = robotctl_process("drive", "--disable", "--target", robot.target)
         assert (again.returncode, again.stdout) == (0, "driving is disabled\n")
     finally:
-        with robotctl_on_terminal("drive", "--enable", "--target", robot.target) as screen:
-            begin(screen, PLAIN_ANSWER)
+        with robotctl_on_plain("drive", "--enable", "--target", robot.target) as screen:
             screen.press("x")
             assert screen.process.wait(20) == 0
     assert robot.teleop.enabled
@@ -264,9 +278,7 @@ def with_a_gamepad(robot: DrivenRobot, columns: int = 160) -> Iterator[Terminal]
     """Robotctl drive with a gamepad in the test's hands, at a terminal that does not report releases."""
     words = ["drive", "--input", "gamepad", "--target", robot.target]
     program = [sys.executable, "-m", "tests.support.padded_robotctl", *words]
-    with terminal_with(program, columns=columns) as screen:
-        screen.wait_for("\x1b[?u")
-        screen.press(PLAIN_ANSWER)
+    with kitty_with(program, speaks=False, columns=columns) as screen:
         screen.wait_for("hold a shoulder button of")
         yield screen
 

@@ -285,7 +285,63 @@ def test_a_terminal_whose_flags_are_taken_away_releases() -> None:
     assert hands.steering(0.1) is None
 
 
-def test_taps_need_no_answer() -> None:
+def test_a_key_without_its_protocol_needs_no_answer() -> None:
     hands = watched()
     hands.take("w", 10.0)
     assert hands.steering(10.1) == Steering(1, 0, 0)
+
+
+ATTRIBUTES = "\x1b[?62;22c"
+
+
+def watched_taps() -> Hands:
+    """At a terminal that does not report releases, and has answered now."""
+    return Hands(releases=False, liveness=Liveness(0.0, releases=False))
+
+
+def test_presses_count_as_long_as_the_terminal_answers() -> None:
+    hands, now_s = watched_taps(), 0.0
+    while now_s < 60.0:
+        now_s += ASK_EVERY_S
+        assert hands.ask(now_s) == "\x1b[c"
+        hands.take("w" + ATTRIBUTES, now_s + 0.05)
+        assert not hands.awaits_answer
+        assert hands.steering(now_s + 0.06) == (1, 0, 0)
+
+
+def test_a_press_that_was_held_up_on_its_way_moves_nothing() -> None:
+    """After a cut the presses of all that time arrive at once."""
+    hands = watched_taps()
+    assert hands.ask(0.1)
+    hands.take("www" + ATTRIBUTES + "w", 5.0)
+    assert not hands.answers(5.0)
+    assert hands.steering(5.0) is None
+    assert hands.ask(5.0)
+    hands.take(ATTRIBUTES, 5.1)
+    assert hands.steering(5.1) is None
+    hands.take("w", 5.2)
+    assert hands.steering(5.2) == (1, 0, 0)
+
+
+@pytest.mark.parametrize("releases", [True, False])
+def test_a_reset_that_was_held_up_resets_no_stop_that_is_newer(releases: bool) -> None:
+    """It would be of the stop that is shown now. A stop counts at any age."""
+    hands = Hands(releases=releases, liveness=Liveness(0.0, releases=releases))
+    assert hands.take("r", 0.2) == [Action.RESET]
+    assert hands.take("r x", 5.0) == [Action.STOP, Action.QUIT]
+
+
+def test_a_terminal_that_is_cut_off_says_so_though_its_presses_count_for_a_moment_alone() -> None:
+    hands = watched_taps()
+    assert hands.ask(0.1)
+    assert hands.answers(KNOWN_FOR_S)
+    assert not hands.answers(KNOWN_FOR_S + 0.001)
+
+
+@pytest.mark.parametrize(("releases", "answer"), [(True, ATTRIBUTES), (False, ANSWER)])
+def test_an_answer_to_something_else_is_none(releases: bool, answer: str) -> None:
+    hands = Hands(releases=releases, liveness=Liveness(0.0, releases=releases))
+    assert hands.ask(0.4)
+    hands.take(answer, 0.4)
+    assert hands.awaits_answer
+    assert not hands.answers(KNOWN_FOR_S + 0.001)

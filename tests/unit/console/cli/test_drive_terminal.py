@@ -3,6 +3,8 @@
 import asyncio
 import os
 import pty
+import select
+import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
@@ -63,9 +65,9 @@ async def test_it_reports_releases_while_the_block_lasts_where_it_says_so(
     async with screen(monkeypatch, kitty) as shown:
         keyboard = Keyboard()
         keyboard.take()
-        async with drive_terminal.reporting_keys(keyboard) as liveness:
-            assert (liveness is not None) == (knows & 10 == 10)
-            await has(shown, "\x1b[?1004h", pushed=liveness is not None)
+        async with drive_terminal.reporting_keys(keyboard) as hands:
+            assert hands.releases == (knows & 10 == 10)
+            await has(shown, "\x1b[?1004h", pushed=hands.releases)
         keyboard.give_back()
         await has(shown, "\x1b[?1004l")
 
@@ -76,8 +78,9 @@ async def test_a_terminal_that_does_not_speak_the_protocol_gets_none_of_it(
     async with screen(monkeypatch, None) as shown:
         keyboard = Keyboard()
         keyboard.take()
-        async with drive_terminal.reporting_keys(keyboard) as liveness:
-            assert liveness is None
+        async with drive_terminal.reporting_keys(keyboard) as hands:
+            assert not hands.releases
+            assert not hands.ask(time.monotonic() + 1.0), "it never answers"
         keyboard.give_back()
         await has(shown, "\x1b[?1004l")
         assert shown.written == "\x1b[?u\x1b[c\x1b[?1004h\x1b[?1004l"
@@ -111,6 +114,24 @@ async def test_a_terminal_that_falls_silent_when_it_is_asked_again_gets_its_flag
     async with screen(monkeypatch, kitty) as shown:
         keyboard = Keyboard()
         keyboard.take()
-        async with drive_terminal.reporting_keys(keyboard) as liveness:
-            assert liveness is None
+        async with drive_terminal.reporting_keys(keyboard) as hands:
+            assert not hands.releases
+            assert not hands.ask(time.monotonic() + 1.0), "it does not answer"
+        await has(shown, "\x1b[?1004l")
+
+
+@pytest.mark.parametrize("speaks", [True, False])
+async def test_no_answer_is_left_for_the_shell(monkeypatch: pytest.MonkeyPatch, speaks: bool) -> None:
+    """Without the protocol it is asked for what every terminal answers."""
+    async with screen(monkeypatch, Kitty(speaks=speaks)) as shown:
+        keyboard = Keyboard()
+        keyboard.take()
+        async with drive_terminal.reporting_keys(keyboard) as hands:
+            assert hands.releases == speaks
+            request = hands.ask(time.monotonic() + 1.0)
+            assert request == ("\x1b[?u" if speaks else "\x1b[c")
+            drive_terminal.ask(request)
+        assert not hands.awaits_answer
+        assert not select.select([keyboard.fileno], [], [], 0)[0]
+        keyboard.give_back()
         await has(shown, "\x1b[?1004l")
