@@ -1,6 +1,6 @@
 """Schema of the socket between the gateway and the drive program (omniseer.drive.v1), on this side."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Final
 
 from google.protobuf.message import DecodeError
@@ -18,6 +18,9 @@ MAX_MESSAGE_BYTES: Final = 16 * 1024
 _MAX_NAME: Final = 128
 _MAX_TEXT: Final = 512
 """Characters kept of what callers write: every report must fit into one packet."""
+_MOST_PROBLEMS: Final = 4 * 1024
+_MOST_OBSTACLE: Final = 2 * 1024
+"""Bytes of what the graph makes longer: names of nodes and topics, as many as there are."""
 
 PHASES: Final = {phase: pb.Phase.Value(f"PHASE_{phase.name}") for phase in Phase}
 RESTING_PHASES: Final = frozenset(PHASES[phase] for phase in RESTING)
@@ -158,14 +161,33 @@ def actual_state(
         speed_limit_mps=_speed_limit_mps(state, rules, now_ns),
         turn_limit_rad_s=_turn_limit_rad_s(state, rules, now_ns),
         counters=counters,
-        problems=problems,
-        reset_obstacle=reset_obstacle(state, now_ns) if state.latch else "",
+        problems=_fitting(problems),
+        reset_obstacle=_cut(reset_obstacle(state, now_ns), _MOST_OBSTACLE) if state.latch else "",
         enabled=state.enabled,
     )
     if command:
         message.newest_sequence, message.command_ns = command.sequence, state.command_ns
     _add_what_is_kept(message, state, episode)
     return message
+
+
+def _fitting(problems: list[str]) -> Iterator[str]:
+    """Yields the problems as far as they fit into a report, the last one cut off."""
+    left = _MOST_PROBLEMS
+    for problem in problems:
+        kept = _cut(problem, left)
+        left -= len(kept.encode())
+        if kept:
+            yield kept
+
+
+def _cut(text: str, most_bytes: int) -> str:
+    """Returns as much of a text as fits, with an ellipsis where that is not all of it."""
+    encoded = text.encode()
+    if len(encoded) <= most_bytes:
+        return text
+    kept = encoded[: max(0, most_bytes - len("..."))].decode(errors="ignore")
+    return f"{kept}..." if kept else ""
 
 
 def heartbeat(state: State, episode: Episode | None, matched: int, *, lock_left: bool) -> pb.ActualState:

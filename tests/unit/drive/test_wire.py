@@ -8,7 +8,16 @@ from drive.episode import Episode
 from drive.inhibits import Deadlines
 from drive.machine import Enable, EndLease, GrantLease, Reset, Rules, State, Stop
 from drive.phases import Phase
-from drive.values import Command, Inhibit, Latch, Lease, LeaseEnd, Supervision, Velocity
+from drive.values import (
+    Command,
+    Inhibit,
+    Latch,
+    Lease,
+    LeaseEnd,
+    Supervision,
+    Surroundings,
+    Velocity,
+)
 from drive.wire import (
     INHIBITS,
     MAX_MESSAGE_BYTES,
@@ -76,7 +85,12 @@ def test_any_packet_is_a_message_or_a_protocol_error(packet: bytes) -> None:
     event_of(message)
 
 
-def test_no_caller_makes_a_report_larger_than_a_packet() -> None:
+@pytest.mark.parametrize("graph", ["usual", "hostile"])
+def test_neither_callers_nor_the_graph_make_a_report_larger_than_a_packet(graph: str) -> None:
+    """A program may publish the lock under any number of names, and topics have long ones, too."""
+    hostile = graph == "hostile"
+    known = ["x" * 8 * 257, "x" * 257]
+    around = Surroundings(commanded_on=("/" + "x" * 246,) * (16 if hostile else 0))
     stop = event_of(pb.ToDrive(stop=pb.Stop(by=LONG, reason=LONG)))
     grant = event_of(pb.ToDrive(grant=pb.GrantLease(session_id=LONG, holder=LONG)))
     assert isinstance(stop, Stop)
@@ -84,15 +98,17 @@ def test_no_caller_makes_a_report_larger_than_a_packet() -> None:
     latch = Latch(1, stop.by, stop.reason)
     by = f"stopped by {stop.by}: {stop.reason}"
     report = actual_state(
-        State(phase=Phase.STOPPED, lease=grant.lease, latch=latch),
+        State(phase=Phase.STOPPED, lease=grant.lease, latch=latch, surroundings=around),
         Rules(),
         0,
         revision=1,
         counters=pb.Counters(),
         episode=Episode(1, grant.lease.holder, 0, ended_by=by),
-        problems=["x" * 8 * 257, "x" * 257],
+        problems=[*known, *([LONG] * 9 if hostile else [])],
     )
     assert report.ByteSize() < MAX_MESSAGE_BYTES - 1024
+    assert list(report.problems[:2]) == known
+    assert hostile == ("motion on /xx" in report.reset_obstacle)
 
 
 @pytest.mark.parametrize("enabled", [True, False])
