@@ -146,6 +146,8 @@ class _Cockpit:
         speed_mps, turn_rad_s = speeds
         self._speeds = Speeds(speed_mps or most.vx_mps, speed_mps or most.vy_mps, turn_rad_s or most.wz_rad_s)
         self._shown: object = None
+        self._shown_stop = 0
+        """Number of the stop that is shown, which a reset is for; 0 without one."""
         self._note = ""
         self._begun = False
         """Whether the robot was ready once: a key that is down before would be a hold without a beginning."""
@@ -206,8 +208,8 @@ class _Cockpit:
                 case Action.STOP:
                     hands.release()
                     self._call(self._stop("by the driver's keyboard"))
-                case Action.RESET:
-                    self._call(self._reset())
+                case Action.RESET if self._shown_stop:
+                    self._call(self._reset(self._shown_stop))
                 case Action.RELEASE:
                     self._controls.release()
         self._hold(hands)
@@ -231,12 +233,9 @@ class _Cockpit:
         except GatewayError as error:
             self._note = str(error)
 
-    async def _reset(self) -> None:
-        state = self._driving.state
-        if state is None or state.stop is None:
-            return
+    async def _reset(self, stop_id: int) -> None:
         try:
-            self._note = (await self._client.reset_stop(state.stop.stop_id)).message
+            self._note = (await self._client.reset_stop(stop_id)).message
         except GatewayError as error:
             self._note = str(error)
 
@@ -244,6 +243,7 @@ class _Cockpit:
         state = self._driving.state
         if state is None:
             return
+        self._shown_stop = state.stop.stop_id if state.stop else 0
         if self._session.as_json:
             key = state.phase, state.inhibits, state.stop and state.stop.stop_id
             if key != self._shown:

@@ -1,0 +1,65 @@
+"""What robotctl drive makes of its keys, with a robot that the test plays."""
+
+import asyncio
+import io
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from console.cli.drive import _Cockpit
+from console.cli.drive_input import Controls, Input
+from console.cli.drive_keys import Hands
+from console.client.results import DriveLimits, DrivePhase
+
+EACH_LIMIT: dict[str, Any] = dict.fromkeys(DriveLimits.__slots__, 0.2)
+
+
+def stopped(stop_id: int) -> Any:
+    """A state of a robot that is stopped."""
+    stop = SimpleNamespace(stop_id=stop_id, by="anna", reason="a child")
+    still = {"vx_mps": 0.0, "vy_mps": 0.0, "wz_rad_s": 0.0}
+    return SimpleNamespace(phase=DrivePhase.STOPPED, inhibits=(), stop=stop, **still)
+
+
+class Robot:
+    """Client and session, as far as the cockpit needs them."""
+
+    limits = DriveLimits(**EACH_LIMIT)
+    is_ready = False
+
+    def __init__(self) -> None:
+        self.state = stopped(5)
+        self.resets: list[int] = []
+
+    def reasons(self) -> str:
+        return f"stop {self.state.stop.stop_id}"
+
+    def release(self) -> None:
+        pass
+
+    async def reset_stop(self, stop_id: int) -> Any:
+        self.resets.append(stop_id)
+        return SimpleNamespace(message="")
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+async def test_r_resets_the_stop_that_is_shown_and_none_that_has_come_since(
+    monkeypatch: pytest.MonkeyPatch, as_json: bool
+) -> None:
+    monkeypatch.setattr("console.cli.drive.json_form", lambda _: {})
+    robot: Any = Robot()
+    session: Any = SimpleNamespace(as_json=as_json, out=Console(file=io.StringIO()))
+    cockpit = _Cockpit(session, robot, robot, (None, None), Controls(Input.KEYBOARD, None))
+    hands = Hands(releases=False)
+    cockpit._take("r", hands)
+    cockpit._show(hands)
+    robot.state = stopped(6)
+    cockpit._take("r", hands)
+    await asyncio.gather(*cockpit._calls)
+    assert robot.resets == [5]
+    cockpit._show(hands)
+    cockpit._take("r", hands)
+    await asyncio.gather(*cockpit._calls)
+    assert robot.resets == [5, 6]
