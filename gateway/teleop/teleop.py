@@ -192,7 +192,7 @@ class Teleop:
     def facts(self, driving: Driving) -> DriveFacts:
         """Returns what a lane is sent."""
         drive, newest, now_ns = self.link.view, driving.newest, time.monotonic_ns()
-        granted = self._granted == (self._commands.connection, driving.session.session_id)
+        granted = self._is_granted(driving.session)
         phase = drive.phase
         if phase is DrivePhase.AVAILABLE or (phase is DrivePhase.DISABLED and drive.enabled):
             # The lease is on its way to the drive program, or waits for it.
@@ -285,12 +285,14 @@ class Teleop:
         if self._driving and self._driving.session is session:
             return self._driving
         if last:
-            # Granting replaces it there; ending it would hand the robot to other sources in between.
             self._forget()
             _log.info("driving: %s has taken over from %s", driver.name, last.driver.name)
         self._driving, self._access_ended = Driving(session, Pacing(now_s)), False
         _log.info("driving: %s has the lease", driver.name)
         self._grant()
+        if last and not self._is_granted(session):
+            # Granting would replace it there; ending it hands the robot to other sources in between.
+            self._commands.end(last.session_id, LeaseEnd.TAKEN_OVER)
         self.link.changes.notify_all()
         return self._driving
 
@@ -299,14 +301,17 @@ class Teleop:
         driving, view = self._driving, self.link.view
         if driving is None or not (view.enabled and view.applied and view.reachable):
             return
-        session, wanted = driving.session, (self._commands.connection, driving.session.session_id)
-        if self._granted != wanted and self._commands.grant(
+        session = driving.session
+        if not self._is_granted(session) and self._commands.grant(
             session.session_id,
             session.driver.name,
             line_of_sight=session.line_of_sight,
             streaming=session.streaming,
         ):
-            self._granted = wanted
+            self._granted = self._commands.connection, session.session_id
+
+    def _is_granted(self, session: Session) -> bool:
+        return self._granted == (self._commands.connection, session.session_id)
 
     def _end(self, session: Session, why: LeaseEnd) -> None:
         _log.info("driving: the lease of %s has ended: %s", session.driver.name, why.value)

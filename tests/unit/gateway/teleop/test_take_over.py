@@ -1,0 +1,72 @@
+"""What the drive program is sent when a driver takes over from another."""
+
+from typing import Any
+
+import pytest
+
+from common.broadcast import Broadcast
+from gateway.links.drive.commands import DriveCommands
+from gateway.status.event import ControlAction
+from gateway.status.preview import PreviewView
+from gateway.status.teleop import DriveView, LeaseEnd
+from gateway.teleop.episodes import Episodes
+from gateway.teleop.lease import Driver
+from gateway.teleop.teleop import Teleop
+from omniseer.drive.v1 import drive_pb2 as pb
+from tests.support.drive_views import actual
+
+ANNA, ADMIN = Driver("anna", "anna", "10.0.0.9:4711"), Driver("carla", "carla", "10.0.0.8:4711", admin=True)
+
+
+class Connection:
+    """Takes leases, as the drive program does."""
+
+    def __init__(self) -> None:
+        self.lease = ""
+
+    def send(self, message: pb.ToDrive) -> bool:
+        if message.HasField("grant"):
+            self.lease = message.grant.session_id
+        elif message.HasField("end") and message.end.session_id == self.lease:
+            self.lease = ""
+        return True
+
+
+class Link:
+    """To a drive program whose desired state is applied, or on its way."""
+
+    def __init__(self) -> None:
+        self.changes = Broadcast()
+        self.applied = True
+
+    @property
+    def view(self) -> DriveView:
+        return DriveView(enabled=True, applied=self.applied, error="", actual=actual())
+
+
+class Never:
+    """What no test here comes to."""
+
+    @property
+    def view(self) -> PreviewView:
+        raise AssertionError
+
+    def record_action(self, action: ControlAction) -> None:
+        raise AssertionError(action)
+
+
+@pytest.mark.parametrize("applied", [True, False])
+def test_no_lease_is_left_of_a_driver_who_was_taken_over_from(applied: bool) -> None:
+    """The new one can't be granted while the desired state is on its way, and may end before it is."""
+    link, connection = Link(), Connection()
+    commands, port = DriveCommands(Never()), Never()  # type: ignore[arg-type]
+    commands._client = connection  # type: ignore[assignment]
+    drive: Any = link
+    teleop = Teleop(drive, commands, port, line_of_sight=True, episodes=Episodes(port))
+    first = teleop.open_lane(ANNA, take_over=False, line_of_sight=True)
+    assert connection.lease == first.session_id
+    link.applied = applied
+    second = teleop.open_lane(ADMIN, take_over=True, line_of_sight=True)
+    assert connection.lease == (second.session_id if applied else "")
+    second.close(LeaseEnd.CLOSED)
+    assert connection.lease == ""
