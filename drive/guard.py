@@ -121,11 +121,22 @@ class Guard:
 
         Returns:
             The exit code: that of the first worker if it has refused to start, otherwise 0.
+
+        Raises:
+            OSError: the first worker can't be started.
         """
         while self._end_by_ns is None:
-            code = self._run_worker()
-            if not self._served and code in _REFUSALS:
-                return code
+            try:
+                worker, heartbeats = self._started_worker()
+            except OSError as error:
+                if not self._served:
+                    raise
+                # Short of memory, or of processes: what may have ended the last one as well.
+                _log.error("no worker can be started, until another attempt: %s", error)
+            else:
+                code = self._run_worker(worker, heartbeats)
+                if not self._served and code in _REFUSALS:
+                    return code
             if self._end_by_ns is None:
                 self._publish_zeros_for(self._backoff.next_s())
         if self._zeros_until_ns:
@@ -133,25 +144,42 @@ class Guard:
             self._velocities.wait_until_acknowledged()
         return 0
 
-    def _run_worker(self) -> int | None:
-        """Runs one worker to its end, and takes its loss; returns its exit code, None while it has none."""
+    def _started_worker(self) -> "tuple[subprocess.Popen[bytes], socket.socket]":
+        """Returns a new worker, and the end of its heartbeats that is this process's.
+
+        Raises:
+            OSError: it can't be started.
+        """
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        with ours:
-            with theirs:
-                environment = os.environ | {
-                    HEARTBEATS: str(theirs.fileno()),
-                    STOPS: self._stops.as_json(),
-                    KILLS: str(self._kills),
-                }
+        environment = os.environ | {
+            HEARTBEATS: str(theirs.fileno()),
+            STOPS: self._stops.as_json(),
+            KILLS: str(self._kills),
+        }
+        with theirs:
+            try:
                 # Without common.child.end_with_parent: when this process is killed, the worker has the last
                 # word (zeros), and ends by itself because nothing reads its heartbeats.
                 worker = self._worker = subprocess.Popen(  # noqa: S603  # this program's own worker
                     self._command, env=environment, pass_fds=[theirs.fileno()]
                 )
-            if self._end_by_ns is not None:
-                worker.terminate()  # The signal to stop came while it was being started.
+            except OSError:
+                ours.close()
+                raise
+        if self._end_by_ns is not None:
+            worker.terminate()  # The signal to stop came while it was being started.
+        return worker, ours
+
+    def _run_worker(self, worker: "subprocess.Popen[bytes]", heartbeats: socket.socket) -> int | None:
+        """Follows a worker to its end, and takes its loss; returns its exit code, None while it has none.
+
+        Args:
+            worker: that has just been started.
+            heartbeats: of it; closed here.
+        """
+        with heartbeats:
             watch = Watch.started(time.monotonic_ns())
-            failure = self._follow(ours, watch, worker.pid)
+            failure = self._follow(heartbeats, watch, worker.pid)
         # First the kill, then the zeros: a worker that thaws must not have the last word.
         if failure:
             worker.kill()

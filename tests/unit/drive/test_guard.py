@@ -1,7 +1,9 @@
 """The guard, with small programs for workers: what it publishes, when it kills, what it keeps."""
 
+import errno
 import os
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -10,6 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -190,6 +193,34 @@ def test_zeros_go_on_while_the_next_workers_fail(tmp_path: Path) -> None:
         assert read_stops(running.stop_file).latch == Latch(
             1, "robot-drive", "its worker was lost while a driver had the robot"
         )
+
+
+def test_zeros_go_on_while_no_worker_can_be_started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where memory or processes are short: what the kernel has killed a worker for may keep out the next."""
+    attempts: list[float] = []
+    popen = subprocess.Popen
+
+    def refused_twice(*command: Any, **options: Any) -> Any:
+        attempts.append(time.monotonic())
+        if len(attempts) <= 2:
+            raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+        return popen(*command, **options)
+
+    with guarding(tmp_path, "PHASE_STOPPED") as running:
+        lost = running.worker()
+        monkeypatch.setattr("drive.guard.subprocess.Popen", refused_twice)
+        os.kill(lost, signal.SIGKILL)
+        running.worker(2)
+        assert len(attempts) == 3
+        assert [at_s for at_s in running.zeros.at_s if attempts[0] < at_s < attempts[1]]
+        assert [at_s for at_s in running.zeros.at_s if attempts[1] < at_s < attempts[2]]
+
+
+def test_a_worker_that_can_never_be_started_ends_the_guard(tmp_path: Path) -> None:
+    stop_file = StopFile(tmp_path / "stop.json")
+    with pytest.raises(FileNotFoundError):
+        Guard([str(tmp_path / "none")], Zeros(), OnLoss.HOLD, stop_file, Stops()).run()
+    stop_file.close()
 
 
 def test_hand_back_ends_the_zeros(tmp_path: Path) -> None:
