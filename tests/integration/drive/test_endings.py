@@ -4,6 +4,7 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from typing import Any
 
 import pytest
@@ -63,7 +64,8 @@ def _signal(who: str, number: signal.Signals) -> Callable[[Driving], None]:
         assert robot.peer
         guard, worker, gateway = robot.guard.pid, robot.worker.pid, robot.peer.process.pid
         for pid in {"gateway": [gateway], "worker": [worker], "guard": [guard], "both": [guard, worker]}[who]:
-            os.kill(pid, number)
+            with suppress(ProcessLookupError):  # The worker may have been ended by the guard.
+                os.kill(pid, number)
         if who in {"guard", "both"}:
             robot.guard.wait(10)
 
