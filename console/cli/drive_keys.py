@@ -179,9 +179,7 @@ class Hands:
     def steering(self, now_s: float) -> Steering | None:
         """Returns what the keys that are down amount to; None with no key down."""
         if not self.answers(now_s):
-            self._down.clear()
-            if not self.releases:
-                self._taps.clear()  # Held up on their way, it is not known for how long.
+            self.release()
         self._taps = {key: at_s for key, at_s in self._taps.items() if now_s - at_s < TAP_S}
         return steering_of({*self._down.values(), *self._taps})
 
@@ -250,11 +248,12 @@ class Hands:
             return
         elif not self.releases:
             self._tap(direction, now_s)
-        elif event in _PRESSED:
+        elif event in _PRESSED and self.answers(now_s):
             self._down[place] = direction
 
     def _tap(self, direction: Direction | None, now_s: float) -> None:
-        if direction:
+        # Held up on its way, it is not known for how long: also where the next answer is in the same read.
+        if direction and self.answers(now_s):
             self._taps[direction] = now_s
 
 

@@ -285,10 +285,12 @@ def test_a_terminal_whose_flags_are_taken_away_releases() -> None:
     assert hands.steering(0.1) is None
 
 
-def test_a_key_without_its_protocol_needs_no_answer() -> None:
+def test_a_key_without_its_protocol_needs_an_answer_as_well() -> None:
     hands = watched()
+    hands.take("w", KNOWN_FOR_S)
+    assert hands.steering(KNOWN_FOR_S) == Steering(1, 0, 0)
     hands.take("w", 10.0)
-    assert hands.steering(10.1) == Steering(1, 0, 0)
+    assert hands.steering(10.1) is None
 
 
 ATTRIBUTES = "\x1b[?62;22c"
@@ -321,6 +323,24 @@ def test_a_press_that_was_held_up_on_its_way_moves_nothing() -> None:
     assert hands.steering(5.1) is None
     hands.take("w", 5.2)
     assert hands.steering(5.2) == (1, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("releases", "press", "answer"), [(True, W_DOWN, ANSWER), (False, "w", ATTRIBUTES)], ids=["down", "tap"]
+)
+def test_a_press_that_comes_before_the_next_answer_moves_nothing_in_one_read_with_it(
+    releases: bool, press: str, answer: str
+) -> None:
+    hands = Hands(releases=releases, liveness=Liveness(0.0, releases=releases))
+    assert hands.ask(0.1)
+    hands.take(answer + press * 90, 5.0)
+    assert hands.steering(5.0) is None
+    assert hands.ask(5.02)
+    hands.take(press * 30 + answer, 5.08)
+    assert hands.answers(5.08)
+    assert hands.steering(5.08) is None
+    hands.take(press, 5.1)
+    assert hands.steering(5.1) == (1, 0, 0)
 
 
 @pytest.mark.parametrize("releases", [True, False])
