@@ -9,6 +9,7 @@ and what it reports when it goes on may be as old as that.
 
 import math
 import re
+from collections import deque
 from enum import Enum
 from typing import Final
 
@@ -19,6 +20,10 @@ TAP_S: Final = 0.3
 second), and short of the delay before the first."""
 ASK_EVERY_S: Final = 0.1
 """Between two requests for a sign of life."""
+ASK_AGAIN_S: Final = 2.0
+"""From a request that is not answered to the next one: its answer may be lost."""
+_MOST_REQUESTS: Final = 4
+"""That are not answered. With as many lost answers each would count for a request that is too old."""
 KNOWN_FOR_S: Final = 0.5
 """How long a key counts after the newest request that the terminal has answered. Beyond ASK_EVERY_S and the
 round trips of most networks."""
@@ -100,9 +105,10 @@ def report_releases(flags: int | None) -> bool:
 class Liveness:
     """Until when the keys are known: a terminal that is frozen or cut off reports no release, and no press.
 
-    It is asked again and again, one request at a time: for its flags if it reports releases, else for its
-    attributes. Its answer comes after the keys' events from before: it makes them known as of the moment when
-    the request was sent, however late it is.
+    It is asked again and again: for its flags if it reports releases, else for its attributes. Its answer
+    comes after the keys' events from before: it makes them known as of the moment when the request was sent,
+    however late it is. Each answer counts for the oldest request: where one was lost, those that follow are
+    taken for older than they are.
 
     Args:
         now_s: When the terminal has answered last.
@@ -112,29 +118,32 @@ class Liveness:
     def __init__(self, now_s: float, *, releases: bool = True) -> None:
         self._releases = releases
         self._known_s = now_s
-        self._asked_s: float | None = None
-        """When the request was sent that is not answered yet."""
+        self._asked_s: deque[float] = deque()
+        """When the requests were sent that are not answered yet: at most _MOST_REQUESTS, the oldest first."""
+        self._newest_s = now_s
+        """When the newest request was sent."""
         self._ask_s = now_s
         """When the next one is due."""
 
     @property
     def awaited(self) -> bool:
         """Whether an answer is due."""
-        return self._asked_s is not None
+        return bool(self._asked_s)
 
     def ask(self, now_s: float) -> str:
         """Returns the request that is to be sent now; empty for none."""
-        if self._asked_s is not None or now_s < self._ask_s:
+        if now_s < self._ask_s or len(self._asked_s) >= _MOST_REQUESTS:
             return ""
-        self._asked_s, self._ask_s = now_s, now_s + ASK_EVERY_S
+        self._asked_s.append(now_s)
+        self._newest_s, self._ask_s = now_s, now_s + ASK_AGAIN_S
         return ASK_FLAGS if self._releases else ASK_ATTRIBUTES
 
     def take(self, flags: int | None) -> None:
         """Takes an answer, None for its attributes. Without the flags for releases nothing is known."""
-        if self._asked_s is not None and self._releases == (flags is not None):
-            known = flags is None or report_releases(flags)
-            self._known_s = self._asked_s if known else -math.inf
-            self._asked_s = None
+        if self._asked_s and self._releases == (flags is not None):
+            asked_s = self._asked_s.popleft()
+            self._known_s = asked_s if flags is None or report_releases(flags) else -math.inf
+            self._ask_s = self._newest_s + ASK_EVERY_S
 
     def lasts(self, now_s: float) -> bool:
         """Returns whether the terminal has answered in time."""

@@ -4,6 +4,7 @@ import pytest
 
 from console.cli.drive_keys import (
     ACTIONS,
+    ASK_AGAIN_S,
     ASK_EVERY_S,
     KNOWN_FOR_S,
     TAP_S,
@@ -365,3 +366,31 @@ def test_an_answer_to_something_else_is_none(releases: bool, answer: str) -> Non
     hands.take(answer, 0.4)
     assert hands.awaits_answer
     assert not hands.answers(KNOWN_FOR_S + 0.001)
+
+
+@pytest.mark.parametrize(("releases", "answer"), [(True, ANSWER), (False, ATTRIBUTES)])
+def test_a_lost_answer_silences_the_keys_for_a_moment_alone(releases: bool, answer: str) -> None:
+    """A shell has read it, after Ctrl-Z for example. Each answer counts for the oldest request."""
+    hands = Hands(releases=releases, liveness=Liveness(0.0, releases=releases))
+    now_s = 0.1
+    assert hands.ask(now_s), "its answer is lost"
+    assert not hands.ask(now_s + ASK_AGAIN_S - 0.01)
+    now_s += ASK_AGAIN_S
+    assert hands.ask(now_s)
+    hands.take(answer, now_s + 0.05)
+    assert not hands.answers(now_s + 0.05), "it may be that of the first request"
+    for _ in range(100):
+        now_s += ASK_EVERY_S
+        assert hands.ask(now_s)
+        hands.take(answer, now_s + 0.05)
+        assert hands.answers(now_s + 0.05)
+
+
+def test_requests_that_are_not_answered_end() -> None:
+    liveness = Liveness(0.0)
+    requests = [number for number in range(1000) if liveness.ask(float(number))]
+    assert len(requests) < 10
+    for _ in requests:
+        liveness.take(15)
+    assert liveness.lasts(requests[-1])
+    assert liveness.ask(1000.0)
