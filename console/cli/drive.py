@@ -185,7 +185,7 @@ class _Cockpit:
                     self._call(self._stop("by the driver's gamepad"))
                 if request := hands.ask(time.monotonic()):
                     drive_terminal.ask(request)
-                self._hold(hands)
+                self._take("", hands)
                 if ticks % _DRAW_EVERY == 0:
                     self._show(hands)
                 ticks += 1

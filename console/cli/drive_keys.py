@@ -27,6 +27,9 @@ _MOST_REQUESTS: Final = 4
 KNOWN_FOR_S: Final = 0.5
 """How long a key counts after the newest request that the terminal has answered. Beyond ASK_EVERY_S and the
 round trips of most networks."""
+ESCAPE_WITHIN_S: Final = 0.05
+"""From the first character of an answer to its second, which a slow line may deliver by itself. What follows
+later, or never, makes the first the key Esc."""
 
 ASK_FLAGS: Final = "\x1b[?u"
 """Requests the protocol's flags that are in force."""
@@ -45,7 +48,8 @@ _SEQUENCE: Final = re.compile(
     r"\x1b\[(?P<parameters>[0-9:;?]{0,64})(?P<final>[@-~])|\x1bO(?P<application>[A-Z])|(?P<character>.)",
     re.DOTALL,
 )
-_UNFINISHED: Final = re.compile(r"\x1b(?:\[[0-9:;?]{0,64}|O)$")
+_ESCAPE: Final = "\x1b"
+_UNFINISHED: Final = re.compile(r"\x1b(?:\[[0-9:;?]{0,64}|O)?$")
 _FLAGS: Final = re.compile(r"\x1b\[\?([0-9]+)u")
 _ATTRIBUTES: Final = re.compile(r"\x1b\[\?[0-9;]*c")
 _NEEDED: Final = 2 | 8
@@ -166,12 +170,22 @@ class Hands:
         self._taps: dict[Direction, float] = {}
         """When each was pressed last whose release is not reported."""
         self._unfinished = ""
+        self._typed_s = -math.inf
 
     def take(self, typed: str, now_s: float) -> list[Action]:
-        """Takes what was typed; returns what is to be done once, in order."""
+        """Takes what was typed; returns what is to be done once, in order.
+
+        To be called again and again, also where nothing was typed: after a moment without more, the first
+        character of an answer is the key Esc.
+        """
+        if typed:
+            self._typed_s = now_s
         typed = self._unfinished + typed
         unfinished = _UNFINISHED.search(typed)
         self._unfinished = unfinished[0] if unfinished else ""
+        may_begin_answer = self.awaits_answer and now_s - self._typed_s < ESCAPE_WITHIN_S
+        if self._unfinished == _ESCAPE and not may_begin_answer:
+            self._unfinished = ""
         actions = []
         for found in _SEQUENCE.finditer(typed[: len(typed) - len(self._unfinished)]):
             action = self._take(found, now_s)

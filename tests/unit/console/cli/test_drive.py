@@ -2,6 +2,7 @@
 
 import asyncio
 import io
+import time
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,7 +11,7 @@ from rich.console import Console
 
 from console.cli.drive import _Cockpit
 from console.cli.drive_input import Controls, Input
-from console.cli.drive_keys import Hands
+from console.cli.drive_keys import Hands, Liveness
 from console.client.results import DriveLimits, DrivePhase
 
 EACH_LIMIT: dict[str, Any] = dict.fromkeys(DriveLimits.__slots__, 0.2)
@@ -32,6 +33,9 @@ class Robot:
     def __init__(self) -> None:
         self.state = stopped(5)
         self.resets: list[int] = []
+
+    def check(self) -> None:
+        pass
 
     def reasons(self) -> str:
         return f"stop {self.state.stop.stop_id}"
@@ -63,3 +67,16 @@ async def test_r_resets_the_stop_that_is_shown_and_none_that_has_come_since(
     cockpit._take("r", hands)
     await asyncio.gather(*cockpit._calls)
     assert robot.resets == [5, 6]
+
+
+async def test_esc_ends_driving_also_while_an_answer_is_awaited() -> None:
+    """Its character may be the first of that answer: what decides is that no other follows."""
+    robot: Any = Robot()
+    session: Any = SimpleNamespace(as_json=False, out=Console(file=io.StringIO()))
+    cockpit = _Cockpit(session, robot, robot, (None, None), Controls(Input.KEYBOARD, None))
+    hands = Hands(releases=False, liveness=Liveness(time.monotonic(), releases=False))
+    assert hands.ask(time.monotonic())
+    cockpit._take("\x1b", hands)
+    assert not cockpit._ending
+    await asyncio.wait_for(cockpit._drive(hands), 15)
+    assert cockpit._ending

@@ -6,6 +6,7 @@ from console.cli.drive_keys import (
     ACTIONS,
     ASK_AGAIN_S,
     ASK_EVERY_S,
+    ESCAPE_WITHIN_S,
     KNOWN_FOR_S,
     TAP_S,
     Action,
@@ -394,3 +395,21 @@ def test_requests_that_are_not_answered_end() -> None:
         liveness.take(15)
     assert liveness.lasts(requests[-1])
     assert liveness.ask(1000.0)
+
+
+def test_an_answer_may_come_in_pieces_wherever_it_is_cut() -> None:
+    for at in range(1, len(ATTRIBUTES)):
+        hands = watched_taps()
+        assert hands.ask(0.4)
+        assert hands.take(ATTRIBUTES[:at], 0.4) == []
+        assert hands.take("", 0.4 + ESCAPE_WITHIN_S / 2) == []
+        assert hands.take(ATTRIBUTES[at:], 0.5) == []
+        assert hands.answers(0.8)
+
+
+def test_esc_ends_also_while_an_answer_is_awaited() -> None:
+    for then, later_s in (("", ESCAPE_WITHIN_S + 0.01), ("w", 0.01), ("\x1b", 0.01)):
+        hands = watched_taps()
+        assert hands.ask(0.1)
+        assert hands.take("\x1b", 0.2) == []
+        assert hands.take(then, 0.2 + later_s) == [Action.QUIT]
