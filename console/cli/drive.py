@@ -252,7 +252,7 @@ class _Cockpit:
             return
         line = self._driving.reasons()
         if self._begun:
-            note = self._controls.problem(hands) or self._note or self._controls.advice()
+            note = self._controls.problem(hands) or self._note or self._controls.advice(hands)
             line = _line(state, self._driving, note)
         if line != self._shown:
             self._shown = line

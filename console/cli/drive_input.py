@@ -59,15 +59,16 @@ class Controls:
             return "the terminal does not answer: a key counts when it does, and the key is pressed anew"
         return self._pad.problem() if self._pad else ""
 
-    def advice(self) -> str:
-        """Returns how to drive now."""
+    def advice(self, keys: Hands) -> str:
+        """Returns how to drive now, and what is to be known of the keys."""
         pad = self._pad.name if self._pad else ""
         if self._choice is Input.GAMEPAD:
             return (
                 f"hold a shoulder button of {pad} to drive, B stops, x ends" if pad else "plug a gamepad in"
             )
         also = f" or a shoulder button of {pad}" if pad else ""
-        return f"hold w a s d{also} to drive, space stops, x ends"
+        warning = "" if keys.ages_known else "old presses count: this terminal does not answer; "
+        return f"{warning}hold w a s d{also} to drive, space stops, x ends"
 
 
 @contextmanager

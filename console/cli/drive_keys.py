@@ -207,6 +207,11 @@ class Hands:
         return steering_of({*self._down.values(), *self._taps})
 
     @property
+    def ages_known(self) -> bool:
+        """Whether it is known how old a press is; else it counts at any age."""
+        return self._liveness is not None
+
+    @property
     def awaits_answer(self) -> bool:
         """Whether the terminal has yet to give a sign of life that was requested."""
         return self._liveness is not None and self._liveness.awaited

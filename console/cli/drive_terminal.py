@@ -4,6 +4,7 @@ It is written to on standard error, which is the terminal also where standard ou
 """
 
 import asyncio
+import select
 import sys
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
@@ -16,6 +17,8 @@ from console.cli.keyboard import Keyboard
 
 _ANSWER_WITHIN_S: Final = 0.2
 """How long a terminal may take to say which keyboard protocol it speaks."""
+_MOST_READS: Final = 256
+"""For one answer, which may come byte by byte, with keys before it."""
 
 
 @asynccontextmanager
@@ -75,12 +78,14 @@ async def _answer(keyboard: Keyboard) -> str:
     until_s = asyncio.get_running_loop().time() + _ANSWER_WITHIN_S
     _write(drive_keys.ASK_ALL)
     answer = ""
-    while not drive_keys.is_complete(answer):
+    for _ in range(_MOST_READS):
         typed = await _typed(keyboard, until_s)
         if typed is None:
             return ""
         answer += typed
-    return answer
+        if drive_keys.is_complete(answer):
+            return answer
+    return ""
 
 
 async def _take_last_answer(keyboard: Keyboard, hands: Hands) -> None:
@@ -94,7 +99,10 @@ async def _take_last_answer(keyboard: Keyboard, hands: Hands) -> None:
 
 
 async def _typed(keyboard: Keyboard, until_s: float) -> str | None:
-    """Returns what is typed until an instant of the loop; None if nothing is, or the terminal is gone."""
+    """Returns what is typed until an instant of the loop; None if nothing is, or the terminal is gone.
+
+    What is there counts also after that instant: this program may have stood still meanwhile.
+    """
     loop = asyncio.get_running_loop()
     readable = loop.create_future()
     loop.add_reader(keyboard.fileno, _wake, readable)
@@ -102,7 +110,8 @@ async def _typed(keyboard: Keyboard, until_s: float) -> str | None:
         async with asyncio.timeout_at(until_s):
             await readable
     except TimeoutError:
-        return None
+        if not select.select([keyboard.fileno], [], [], 0)[0]:
+            return None
     finally:
         loop.remove_reader(keyboard.fileno)
     return keyboard.typed()

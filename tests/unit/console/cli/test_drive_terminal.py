@@ -120,6 +120,25 @@ async def test_a_terminal_that_falls_silent_when_it_is_asked_again_gets_its_flag
         await has(shown, "\x1b[?1004l")
 
 
+async def test_an_answer_counts_that_comes_while_the_program_stands_still(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its time has run out, and it is there."""
+    monkeypatch.setattr(drive_terminal, "_ANSWER_WITHIN_S", 0.0)
+    async with screen(monkeypatch, Kitty()) as shown:
+        write = drive_terminal._write
+
+        def write_and_have_it_answered(codes: str) -> None:
+            write(codes)
+            shown.read()
+
+        monkeypatch.setattr(drive_terminal, "_write", write_and_have_it_answered)
+        keyboard = Keyboard()
+        keyboard.take()
+        async with drive_terminal.reporting_keys(keyboard) as hands:
+            assert hands.releases
+
+
 @pytest.mark.parametrize("speaks", [True, False])
 async def test_no_answer_is_left_for_the_shell(monkeypatch: pytest.MonkeyPatch, speaks: bool) -> None:
     """Without the protocol it is asked for what every terminal answers."""

@@ -1,0 +1,19 @@
+"""What robotctl drive says of what steers."""
+
+import pytest
+
+from console.cli.drive_input import Controls, Input
+from console.cli.drive_keys import Hands, Liveness
+
+
+@pytest.mark.parametrize("choice", [Input.AUTO, Input.KEYBOARD])
+def test_it_says_where_presses_of_any_age_count(choice: Input) -> None:
+    controls = Controls(choice, None)
+    assert controls.advice(Hands(releases=False)).startswith(
+        "old presses count: this terminal does not answer"
+    )
+    assert controls.advice(Hands(releases=False, liveness=Liveness(0.0))).startswith("hold w a s d to drive")
+
+
+def test_it_says_nothing_of_keys_that_do_not_steer() -> None:
+    assert Controls(Input.GAMEPAD, None).advice(Hands(releases=False)) == "plug a gamepad in"
