@@ -290,9 +290,6 @@ class Teleop:
         self._driving, self._access_ended = Driving(session, Pacing(now_s)), False
         _log.info("driving: %s has the lease", driver.name)
         self._grant()
-        if last and not self._is_granted(session):
-            # Granting would replace it there; ending it hands the robot to other sources in between.
-            self._commands.end(last.session_id, LeaseEnd.TAKEN_OVER)
         self.link.changes.notify_all()
         return self._driving
 
@@ -317,6 +314,10 @@ class Teleop:
         _log.info("driving: the lease of %s has ended: %s", session.driver.name, why.value)
         self._forget()
         self._access_ended = why is LeaseEnd.ACCESS_ENDED
+        if self._granted and not self._is_granted(session):
+            # Who was taken over from may have the lease there still: until this session was granted it, that
+            # kept the robot from other sources.
+            self._commands.end(self._granted[1], LeaseEnd.TAKEN_OVER)
         self._commands.end(session.session_id, why)
         self.link.changes.notify_all()
 

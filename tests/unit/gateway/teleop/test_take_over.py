@@ -55,18 +55,37 @@ class Never:
         raise AssertionError(action)
 
 
+def teleop_with(link: Link, connection: Connection) -> Teleop:
+    commands, port = DriveCommands(Never()), Never()  # type: ignore[arg-type]
+    commands._client = connection  # type: ignore[assignment]
+    drive: Any = link
+    return Teleop(drive, commands, port, line_of_sight=True, episodes=Episodes(port))
+
+
 @pytest.mark.parametrize("applied", [True, False])
 def test_no_lease_is_left_of_a_driver_who_was_taken_over_from(applied: bool) -> None:
     """The new one can't be granted while the desired state is on its way, and may end before it is."""
     link, connection = Link(), Connection()
-    commands, port = DriveCommands(Never()), Never()  # type: ignore[arg-type]
-    commands._client = connection  # type: ignore[assignment]
-    drive: Any = link
-    teleop = Teleop(drive, commands, port, line_of_sight=True, episodes=Episodes(port))
+    teleop = teleop_with(link, connection)
     first = teleop.open_lane(ANNA, take_over=False, line_of_sight=True)
     assert connection.lease == first.session_id
     link.applied = applied
     second = teleop.open_lane(ADMIN, take_over=True, line_of_sight=True)
-    assert connection.lease == (second.session_id if applied else "")
+    assert connection.lease == (second if applied else first).session_id, "it keeps autonomy away"
     second.close(LeaseEnd.CLOSED)
+    assert connection.lease == ""
+
+
+def test_the_first_of_several_drivers_keeps_it_until_the_last_is_granted_the_lease() -> None:
+    link, connection = Link(), Connection()
+    teleop = teleop_with(link, connection)
+    first = teleop.open_lane(ANNA, take_over=False, line_of_sight=True)
+    link.applied = False
+    teleop.open_lane(ADMIN, take_over=True, line_of_sight=True)
+    last = teleop.open_lane(ADMIN, take_over=True, line_of_sight=True)
+    assert connection.lease == first.session_id
+    link.applied = True
+    teleop._grant()
+    assert connection.lease == last.session_id
+    last.close(LeaseEnd.CLOSED)
     assert connection.lease == ""
