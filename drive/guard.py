@@ -123,16 +123,16 @@ class Guard:
             The exit code: that of the first worker if it has refused to start, otherwise 0.
 
         Raises:
-            OSError: the first worker can't be started.
+            OSError, MemoryError: the first worker can't be started.
         """
         while self._end_by_ns is None:
             try:
                 worker, heartbeats = self._started_worker()
-            except OSError as error:
+            except (OSError, MemoryError) as error:
                 if not self._served:
                     raise
                 # Short of memory, or of processes: what may have ended the last one as well.
-                _log.error("no worker can be started, until another attempt: %s", error)
+                _log.error("no worker can be started; it is tried again: %s", str(error) or "out of memory")
             else:
                 code = self._run_worker(worker, heartbeats)
                 if not self._served and code in _REFUSALS:
@@ -148,7 +148,7 @@ class Guard:
         """Returns a new worker, and the end of its heartbeats that is this process's.
 
         Raises:
-            OSError: it can't be started.
+            OSError, MemoryError: it can't be started.
         """
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         environment = os.environ | {
@@ -163,7 +163,7 @@ class Guard:
                 worker = self._worker = subprocess.Popen(  # noqa: S603  # this program's own worker
                     self._command, env=environment, pass_fds=[theirs.fileno()]
                 )
-            except OSError:
+            except (OSError, MemoryError):
                 ours.close()
                 raise
         if self._end_by_ns is not None:
