@@ -233,7 +233,10 @@ class Driving:
         config.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
         command = [sys.executable, "-m", "drive.cli", "serve", "--config", str(config)]
         with self.log.open("ab") as log:
-            self.guard = subprocess.Popen(command, cwd=_ROOT, stderr=log, env=os.environ | self.environment)
+            # A group of its own, as of a program that a shell starts: in an orphaned one nothing freezes.
+            self.guard = subprocess.Popen(
+                command, cwd=_ROOT, stderr=log, env=os.environ | self.environment, process_group=0
+            )
         wait_until(self.observer.state, "the drive program serves", 30)
 
     def connect(self) -> Peer:
