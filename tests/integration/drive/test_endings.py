@@ -30,10 +30,16 @@ def shut_down(*_):
             each.shutdown()
 
 if "drive.cli" in sys.orig_argv:
+    if "serve" in sys.orig_argv:
+        # Which a test run in the background of a script has ignored.
+        for number in (signal.SIGINT, signal.SIGQUIT):
+            signal.signal(number, signal.SIG_DFL)
     signal.signal(signal.SIGUSR1, fail)
     signal.signal(signal.SIGUSR2, shut_down)
 """
 """What goes wrong in guard and worker: an error wherever the program is, and the end of its part of ROS."""
+IN_ORDER = frozenset({signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT})
+"""Signals that end the guard, and so the worker, in order."""
 FAIL, SHUT_DOWN = signal.SIGUSR1, signal.SIGUSR2
 
 
@@ -67,7 +73,8 @@ def _signal(who: str, number: signal.Signals) -> Callable[[Driving], None]:
             with suppress(ProcessLookupError):  # The worker may have been ended by the guard.
                 os.kill(pid, number)
         if who in {"guard", "both"}:
-            robot.guard.wait(10)
+            code = robot.guard.wait(10)
+            assert code == 0 or number not in IN_ORDER
 
     return send
 
@@ -86,6 +93,8 @@ ENDINGS = {
     "worker terminated": _signal("worker", signal.SIGTERM),
     "ended": _signal("guard", signal.SIGTERM),
     "interrupted": _signal("guard", signal.SIGINT),
+    "hung up": _signal("guard", signal.SIGHUP),
+    "quit": _signal("guard", signal.SIGQUIT),
     "guard killed": _signal("guard", signal.SIGKILL),
     "worker fails": _signal("worker", FAIL),
     "guard fails": _signal("guard", FAIL),
@@ -143,19 +152,38 @@ def test_no_terminal_freezes_it(robot: Driving, number: signal.Signals) -> None:
     undisturbed(attempt)
 
 
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGQUIT], ids=lambda each: each.name)
+def test_the_worker_leaves_to_the_guard_what_a_terminal_sends(robot: Driving, number: signal.Signals) -> None:
+    def attempt() -> None:
+        peer = robot.drive()
+        with robot.moving():
+            os.kill(robot.worker.pid, number)
+            runs_on(robot)
+            peer.send(held=False)
+            robot.settled()
+        assert not robot.witness.moves()
+
+    undisturbed(attempt)
+
+
 def test_with_nohup_it_outlives_its_terminal(robot: Driving) -> None:
-    robot.ready()
-    ended(robot)
-    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # Which programs inherit.
-    try:
-        robot.start()
-    finally:
-        signal.signal(signal.SIGHUP, before)
-    assert robot.guard
-    for pid in (robot.guard.pid, robot.worker.pid):
-        os.kill(pid, signal.SIGHUP)
-    runs_on(robot)
-    ended(robot)
+    def attempt() -> None:
+        robot.ready()
+        ended(robot)
+        before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # Which programs inherit.
+        try:
+            robot.start()
+        finally:
+            signal.signal(signal.SIGHUP, before)
+        assert robot.guard
+        with robot.same_worker():
+            for pid in (robot.guard.pid, robot.worker.pid):
+                with suppress(ProcessLookupError):  # After a stall the guard has ended the worker.
+                    os.kill(pid, signal.SIGHUP)
+            runs_on(robot)
+        ended(robot)
+
+    undisturbed(attempt)
 
 
 def runs_on(robot: Driving) -> None:
