@@ -11,6 +11,7 @@ from contextlib import asynccontextmanager
 import pytest
 
 from console.cli import drive_terminal
+from console.cli.drive_keys import ASK_ALL
 from console.cli.keyboard import Keyboard
 from tests.support.eventually import eventually
 from tests.support.kitty import ALL_FLAGS, Kitty
@@ -32,8 +33,14 @@ class Screen:
 
 
 @asynccontextmanager
-async def screen(monkeypatch: pytest.MonkeyPatch, kitty: Kitty | None) -> AsyncIterator[Screen]:
-    """The terminal of this process, while the block lasts; without `kitty` it answers nothing."""
+async def screen(
+    monkeypatch: pytest.MonkeyPatch, kitty: Kitty | None, *, within_s: float = 15.0
+) -> AsyncIterator[Screen]:
+    """The terminal of this process, while the block lasts; without `kitty` it answers nothing.
+
+    An answer that is expected is waited for, however late a stalled machine makes it.
+    """
+    monkeypatch.setattr(drive_terminal, "_ANSWER_WITHIN_S", within_s)
     master, slave = pty.openpty()
     loop = asyncio.get_running_loop()
     shown = Screen(master, kitty)
@@ -75,7 +82,7 @@ async def test_it_reports_releases_while_the_block_lasts_where_it_says_so(
 async def test_a_terminal_that_does_not_speak_the_protocol_gets_none_of_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    async with screen(monkeypatch, None) as shown:
+    async with screen(monkeypatch, None, within_s=0.2) as shown:
         keyboard = Keyboard()
         keyboard.take()
         async with drive_terminal.reporting_keys(keyboard) as hands:
@@ -111,7 +118,7 @@ async def test_a_terminal_that_falls_silent_when_it_is_asked_again_gets_its_flag
             return "" if self.pushed else answer
 
     kitty = Silent()
-    async with screen(monkeypatch, kitty) as shown:
+    async with screen(monkeypatch, kitty, within_s=0.2) as shown:
         keyboard = Keyboard()
         keyboard.take()
         async with drive_terminal.reporting_keys(keyboard) as hands:
@@ -124,17 +131,18 @@ async def test_an_answer_counts_that_comes_while_the_program_stands_still(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Its time has run out, and it is there."""
-    monkeypatch.setattr(drive_terminal, "_ANSWER_WITHIN_S", 0.0)
-    async with screen(monkeypatch, Kitty()) as shown:
+    async with screen(monkeypatch, Kitty(), within_s=0.0) as shown:
+        keyboard = Keyboard()
+        keyboard.take()
         write = drive_terminal._write
 
         def write_and_have_it_answered(codes: str) -> None:
             write(codes)
             shown.read()
+            if codes == ASK_ALL:
+                assert select.select([keyboard.fileno], [], [], 15)[0]
 
         monkeypatch.setattr(drive_terminal, "_write", write_and_have_it_answered)
-        keyboard = Keyboard()
-        keyboard.take()
         async with drive_terminal.reporting_keys(keyboard) as hands:
             assert hands.releases
 
