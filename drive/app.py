@@ -62,8 +62,8 @@ def serve(settings: DriveSettings, config_file: Path | None) -> int:
 def _take_signals(guard: Guard) -> None:
     """Has signals end the guard in order. Nothing a terminal sends ends or freezes both processes at once."""
     for number in _ENDING:
-        # nohup has this one ignored, so that the program outlives its terminal.
-        if number is not signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
+        # nohup has one of them ignored, and a script that starts the program in the background two.
+        if number is signal.SIGTERM or signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, lambda *_: guard.stop())
     for number in _FREEZING:
         signal.signal(number, signal.SIG_IGN)  # In the worker as well, which inherits that.

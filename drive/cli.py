@@ -68,8 +68,8 @@ def doctor(
     """Finds out what keeps this robot from being driven, and what stops it; exits 1 if something is wrong."""
     from drive.doctor.examination import examine  # noqa: PLC0415
 
-    # So that a terminal that is closed ends a pulse with zeros.
-    for number in (signal.SIGTERM, signal.SIGHUP):
+    # So that a terminal that is closed, and Ctrl-\, end a pulse with zeros.
+    for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.default_int_handler)
     end_with_findings(examine(config_file, with_pulse=pulse), as_json=as_json)
 

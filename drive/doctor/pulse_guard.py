@@ -97,7 +97,7 @@ def _followed(pulse: socket.socket) -> PulseFacts:
 @contextmanager
 def _undisturbed() -> Iterator[None]:
     """Ignores the signals that end a program while the block lasts."""
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
     handlers = [signal.signal(number, signal.SIG_IGN) for number in numbers]
     try:
         yield

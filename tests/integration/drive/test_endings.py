@@ -3,8 +3,8 @@
 import os
 import signal
 import time
-from collections.abc import Callable, Iterator
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import pytest
@@ -30,10 +30,6 @@ def shut_down(*_):
             each.shutdown()
 
 if "drive.cli" in sys.orig_argv:
-    if "serve" in sys.orig_argv:
-        # Which a test run in the background of a script has ignored.
-        for number in (signal.SIGINT, signal.SIGQUIT):
-            signal.signal(number, signal.SIG_DFL)
     signal.signal(signal.SIGUSR1, fail)
     signal.signal(signal.SIGUSR2, shut_down)
 """
@@ -43,8 +39,28 @@ IN_ORDER = frozenset({signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQU
 FAIL, SHUT_DOWN = signal.SIGUSR1, signal.SIGUSR2
 
 
+@contextmanager
+def disposed(numbers: Iterable[signal.Signals], how: signal.Handlers) -> Iterator[None]:
+    """Has programs that are started in the block ignore these signals, or not."""
+    before = {number: signal.signal(number, how) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _taken() -> Iterator[None]:
+    """Programs take what those of a test run in the background of a script would ignore."""
+    ignored = [number for number in IN_ORDER if signal.getsignal(number) is signal.SIG_IGN]
+    with disposed(ignored, signal.SIG_DFL):
+        yield
+
+
 @pytest.fixture(scope="module")
 def robot(
+    _taken: None,
     module_ros_domain: int,  # noqa: ARG001  # for its effect
     tmp_path_factory: pytest.TempPathFactory,
 ) -> Iterator[Driving]:
@@ -166,20 +182,20 @@ def test_the_worker_leaves_to_the_guard_what_a_terminal_sends(robot: Driving, nu
     undisturbed(attempt)
 
 
-def test_with_nohup_it_outlives_its_terminal(robot: Driving) -> None:
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGINT, signal.SIGQUIT], ids=lambda each: each.name)
+def test_what_it_was_started_to_ignore_does_not_end_it(robot: Driving, number: signal.Signals) -> None:
+    """SIGHUP by nohup; the others by a script that starts it in the background."""
+
     def attempt() -> None:
         robot.ready()
         ended(robot)
-        before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # Which programs inherit.
-        try:
+        with disposed([number], signal.SIG_IGN):
             robot.start()
-        finally:
-            signal.signal(signal.SIGHUP, before)
         assert robot.guard
         with robot.same_worker():
             for pid in (robot.guard.pid, robot.worker.pid):
                 with suppress(ProcessLookupError):  # After a stall the guard has ended the worker.
-                    os.kill(pid, signal.SIGHUP)
+                    os.kill(pid, number)
             runs_on(robot)
         ended(robot)
 

@@ -23,6 +23,8 @@ pytestmark = [pytest.mark.ros, pytest.mark.timed]
 
 END_S = 60
 SILENT_NS = 100_000_000
+IN_ORDER = frozenset({signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT})
+"""Signals that end the doctor in order."""
 LATE = "its process was silent for"
 """Of a pulse whose process the machine has held up for 250 ms, which ends it."""
 
@@ -172,6 +174,8 @@ def test_a_driver_ends_it(robot: Driving) -> None:
         ("doctor", signal.SIGSTOP, "in motion"),
         ("doctor", signal.SIGTERM, "in motion"),
         ("doctor", signal.SIGINT, "in silence"),
+        ("doctor", signal.SIGHUP, "in motion"),
+        ("doctor", signal.SIGQUIT, "in motion"),
         ("pulse", signal.SIGKILL, "in motion"),
         ("pulse", signal.SIGSTOP, "in motion"),
         ("pulse", signal.SIGSTOP, "in silence"),
@@ -192,6 +196,8 @@ def test_whatever_ends_it_the_last_message_is_zero(
             wait_until(lambda: not robot.witness.moves(), "zero", 5)
             robot.settled()
             assert not robot.witness.moves()
+            if who == "doctor" and number in IN_ORDER:
+                assert process.wait(END_S) >= 0, "no signal has ended it before the pulse"
             process.kill()
         psutil.wait_procs([pulse], timeout=END_S)
 
