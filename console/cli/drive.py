@@ -27,6 +27,8 @@ from console.presentation.json_form import json_form
 from console.steering import Speeds, permitted
 
 _TICK_S: Final = 0.02
+_LAST_CALLS_S: Final = 2.0
+"""For calls that are on their way when driving ends."""
 _DRAW_EVERY: Final = 10
 """Ticks between two lines on the terminal."""
 
@@ -164,13 +166,12 @@ class _Cockpit:
         keyboard.take()
         try:
             with handled(dict.fromkeys(ENDING, self._end)):
-                async with drive_terminal.reporting_keys(keyboard) as hands:
+                async with drive_terminal.reporting_keys(keyboard, self._take_late) as hands:
                     with drive_terminal.reading(keyboard, lambda typed: self._take(typed, hands)):
                         await self._drive(hands)
         finally:
             keyboard.give_back()
-            for call in self._calls:
-                call.cancel()
+            await self._finish_calls()
             if not self._session.as_json:
                 print(file=self._session.out.file)
 
@@ -214,6 +215,11 @@ class _Cockpit:
                     self._controls.release()
         self._hold(hands)
 
+    def _take_late(self, actions: list[Action]) -> None:
+        """Takes what is typed at the end: a stop counts at any time."""
+        if Action.STOP in actions:
+            self._call(self._stop("by the driver's keyboard"))
+
     def _hold(self, hands: Hands) -> None:
         self._begun = self._begun or self._driving.is_ready
         steering, device = self._controls.steering(hands)
@@ -226,6 +232,13 @@ class _Cockpit:
         task = asyncio.create_task(call)
         self._calls.add(task)
         task.add_done_callback(self._calls.discard)
+
+    async def _finish_calls(self) -> None:
+        """Gives calls that are on their way a moment: a stop may have been the last of them."""
+        if self._calls:
+            await asyncio.wait(self._calls, timeout=_LAST_CALLS_S)
+        for call in self._calls:
+            call.cancel()
 
     async def _stop(self, reason: str) -> None:
         try:

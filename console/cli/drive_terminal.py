@@ -12,7 +12,7 @@ from contextlib import ExitStack, asynccontextmanager, contextmanager, suppress
 from typing import Final
 
 from console.cli import drive_keys
-from console.cli.drive_keys import Hands, Liveness
+from console.cli.drive_keys import Action, Hands, Liveness
 from console.cli.keyboard import Keyboard
 
 _ANSWER_WITHIN_S: Final = 0.2
@@ -22,10 +22,17 @@ _MOST_READS: Final = 256
 
 
 @asynccontextmanager
-async def reporting_keys(keyboard: Keyboard) -> AsyncIterator[Hands]:
+async def reporting_keys(
+    keyboard: Keyboard, take_late: Callable[[list[Action]], object]
+) -> AsyncIterator[Hands]:
     """Makes the terminal report releases, where it can, and its focus, while the block lasts.
 
-    Yields the hands on its keys.
+    Args:
+        keyboard: Of the terminal.
+        take_late: Is given what is typed while an answer is awaited after the block.
+
+    Yields:
+        The hands on its keys.
     """
     hands = Hands(releases=False)
     try:
@@ -35,7 +42,7 @@ async def reporting_keys(keyboard: Keyboard) -> AsyncIterator[Hands]:
             modes.callback(_write, drive_keys.FOCUS_END)
             yield hands
     finally:
-        await _take_last_answer(keyboard, hands)
+        take_late(await _take_last_answer(keyboard, hands))
 
 
 @contextmanager
@@ -88,14 +95,19 @@ async def _answer(keyboard: Keyboard) -> str:
     return ""
 
 
-async def _take_last_answer(keyboard: Keyboard, hands: Hands) -> None:
-    """Waits for an answer that is on its way, which would be typed in the shell; not for long."""
+async def _take_last_answer(keyboard: Keyboard, hands: Hands) -> list[Action]:
+    """Waits for an answer that is on its way, which would be typed in the shell; not for long.
+
+    Returns:
+        What is to be done by the keys before it.
+    """
     until_s = asyncio.get_running_loop().time() + _ANSWER_WITHIN_S
-    while hands.awaits_answer:
-        typed = await _typed(keyboard, until_s)
-        if typed is None:
-            return
-        hands.take(typed, time.monotonic())
+    actions: list[Action] = []
+    for _ in range(_MOST_READS):
+        if not hands.awaits_answer or (typed := await _typed(keyboard, until_s)) is None:
+            break
+        actions += hands.take(typed, time.monotonic())
+    return actions
 
 
 async def _typed(keyboard: Keyboard, until_s: float) -> str | None:

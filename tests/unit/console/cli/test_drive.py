@@ -11,7 +11,7 @@ from rich.console import Console
 
 from console.cli.drive import _Cockpit
 from console.cli.drive_input import Controls, Input
-from console.cli.drive_keys import Hands, Liveness
+from console.cli.drive_keys import Action, Hands, Liveness
 from console.client.results import DriveLimits, DrivePhase
 
 EACH_LIMIT: dict[str, Any] = dict.fromkeys(DriveLimits.__slots__, 0.2)
@@ -33,6 +33,7 @@ class Robot:
     def __init__(self) -> None:
         self.state = stopped(5)
         self.resets: list[int] = []
+        self.stops: list[str] = []
 
     def check(self) -> None:
         pass
@@ -42,6 +43,12 @@ class Robot:
 
     def release(self) -> None:
         pass
+
+    async def stop_robot(self, reason: str) -> Any:
+        for _ in range(10):
+            await asyncio.sleep(0)  # As a call that is on its way.
+        self.stops.append(reason)
+        return SimpleNamespace(message="")
 
     async def reset_stop(self, stop_id: int) -> Any:
         self.resets.append(stop_id)
@@ -80,3 +87,20 @@ async def test_esc_ends_driving_also_while_an_answer_is_awaited() -> None:
     assert not cockpit._ending
     await asyncio.wait_for(cockpit._drive(hands), 15)
     assert cockpit._ending
+
+
+@pytest.mark.parametrize("late", [False, True])
+async def test_a_stop_goes_out_also_where_driving_ends_at_once(
+    monkeypatch: pytest.MonkeyPatch, late: bool
+) -> None:
+    monkeypatch.setattr("console.cli.drive._LAST_CALLS_S", 15.0)
+    robot: Any = Robot()
+    session: Any = SimpleNamespace(as_json=False, out=Console(file=io.StringIO()))
+    cockpit = _Cockpit(session, robot, robot, (None, None), Controls(Input.KEYBOARD, None))
+    if late:
+        cockpit._take_late([Action.QUIT, Action.RESET, Action.STOP])
+    else:
+        cockpit._take(" x", Hands(releases=False))
+    await cockpit._finish_calls()
+    assert robot.stops == ["by the driver's keyboard"]
+    assert not robot.resets

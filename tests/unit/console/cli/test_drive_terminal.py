@@ -11,7 +11,7 @@ from contextlib import asynccontextmanager
 import pytest
 
 from console.cli import drive_terminal
-from console.cli.drive_keys import ASK_ALL
+from console.cli.drive_keys import ASK_ALL, Action
 from console.cli.keyboard import Keyboard
 from tests.support.eventually import eventually
 from tests.support.kitty import ALL_FLAGS, Kitty
@@ -24,12 +24,20 @@ class Screen:
         self._master, self.kitty = master, kitty
         self.written = ""
 
+    def press(self, keys: str) -> None:
+        """Presses keys."""
+        os.write(self._master, keys.encode())
+
     def read(self) -> None:
         """Reads what the program has written, and answers."""
         written = os.read(self._master, 4096).decode()
         self.written += written
         if self.kitty:
             os.write(self._master, self.kitty.answer(written).encode())
+
+
+def ignored(actions: list[Action]) -> None:
+    """Takes what is typed at the end."""
 
 
 @asynccontextmanager
@@ -72,7 +80,7 @@ async def test_it_reports_releases_while_the_block_lasts_where_it_says_so(
     async with screen(monkeypatch, kitty) as shown:
         keyboard = Keyboard()
         keyboard.take()
-        async with drive_terminal.reporting_keys(keyboard) as hands:
+        async with drive_terminal.reporting_keys(keyboard, ignored) as hands:
             assert hands.releases == (knows & 10 == 10)
             await has(shown, "\x1b[?1004h", pushed=hands.releases)
         keyboard.give_back()
@@ -85,7 +93,7 @@ async def test_a_terminal_that_does_not_speak_the_protocol_gets_none_of_it(
     async with screen(monkeypatch, None, within_s=0.2) as shown:
         keyboard = Keyboard()
         keyboard.take()
-        async with drive_terminal.reporting_keys(keyboard) as hands:
+        async with drive_terminal.reporting_keys(keyboard, ignored) as hands:
             assert not hands.releases
             assert not hands.ask(time.monotonic() + 1.0), "it never answers"
         keyboard.give_back()
@@ -99,7 +107,7 @@ async def test_an_error_leaves_the_terminal_as_it_was(monkeypatch: pytest.Monkey
     async def fail() -> None:
         keyboard = Keyboard()
         keyboard.take()
-        async with drive_terminal.reporting_keys(keyboard):
+        async with drive_terminal.reporting_keys(keyboard, ignored):
             assert kitty.pushed
             raise ValueError("whatever")
 
@@ -121,7 +129,7 @@ async def test_a_terminal_that_falls_silent_when_it_is_asked_again_gets_its_flag
     async with screen(monkeypatch, kitty, within_s=0.2) as shown:
         keyboard = Keyboard()
         keyboard.take()
-        async with drive_terminal.reporting_keys(keyboard) as hands:
+        async with drive_terminal.reporting_keys(keyboard, ignored) as hands:
             assert not hands.releases
             assert not hands.ask(time.monotonic() + 1.0), "it does not answer"
         await has(shown, "\x1b[?1004l")
@@ -143,7 +151,7 @@ async def test_an_answer_counts_that_comes_while_the_program_stands_still(
                 assert select.select([keyboard.fileno], [], [], 15)[0]
 
         monkeypatch.setattr(drive_terminal, "_write", write_and_have_it_answered)
-        async with drive_terminal.reporting_keys(keyboard) as hands:
+        async with drive_terminal.reporting_keys(keyboard, ignored) as hands:
             assert hands.releases
 
 
@@ -153,7 +161,7 @@ async def test_no_answer_is_left_for_the_shell(monkeypatch: pytest.MonkeyPatch, 
     async with screen(monkeypatch, Kitty(speaks=speaks)) as shown:
         keyboard = Keyboard()
         keyboard.take()
-        async with drive_terminal.reporting_keys(keyboard) as hands:
+        async with drive_terminal.reporting_keys(keyboard, ignored) as hands:
             assert hands.releases == speaks
             request = hands.ask(time.monotonic() + 1.0)
             assert request == ("\x1b[?u" if speaks else "\x1b[c")
@@ -162,3 +170,15 @@ async def test_no_answer_is_left_for_the_shell(monkeypatch: pytest.MonkeyPatch, 
         assert not select.select([keyboard.fileno], [], [], 0)[0]
         keyboard.give_back()
         await has(shown, "\x1b[?1004l")
+
+
+async def test_space_counts_also_while_the_last_answer_is_awaited(monkeypatch: pytest.MonkeyPatch) -> None:
+    late: list[Action] = []
+    async with screen(monkeypatch, Kitty(speaks=False)) as shown:
+        keyboard = Keyboard()
+        keyboard.take()
+        async with drive_terminal.reporting_keys(keyboard, late.extend) as hands:
+            shown.press(" ")
+            drive_terminal.ask(hands.ask(time.monotonic() + 1.0))
+        keyboard.give_back()
+    assert late == [Action.STOP]
