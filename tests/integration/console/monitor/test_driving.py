@@ -186,15 +186,20 @@ def test_a_key_moves_the_robot_while_it_is_down(seat: Seat) -> None:
 def test_the_end_of_driving_releases_what_is_down(seat: Seat, monkeypatch: pytest.MonkeyPatch) -> None:
     """Until the session has ended, the window would hold anew with each tick."""
     seat.ready()
+    hands, driver = seat.window.driving.hands, seat.window._worker.driver
+    end, down = driver.end, list[int]()
+
+    def seen_end() -> None:
+        down.append(len(hands._down))
+        end()
+
+    monkeypatch.setattr(driver, "end", seen_end)
     seat.key(Qt.Key.Key_W, down=True)
     seat.moves()
-    held: list[object] = []
-    monkeypatch.setattr(seat.window._worker.driver, "hold", lambda *how: held.append(how))
     press(seat.window, Qt.Key.Key_T)
-    seat.window.driving.hands._tick()
     seat.key(Qt.Key.Key_W, down=False)
     until(lambda: not seat.robot.teleop.holder, "the lease is given back")
-    assert not held
+    assert down == [0]
 
 
 PLACE = 26
