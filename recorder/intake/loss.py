@@ -21,7 +21,7 @@ from typing import Final
 
 _MAX_SEQUENCES: Final = 256
 _MAX_GONE: Final = 16
-"""More of them, and the one that was silent for longest is forgotten."""
+"""Publishers that have gone and are remembered; of more, those that went last."""
 _MAX_RANGES: Final = 1024
 _MAX_RECENT: Final = 100_000
 """Numbers that are kept to go through them again: those of a second, at up to 100 kHz."""
@@ -84,7 +84,7 @@ class LossCounter:
         self._restarts: list[tuple[int, int]] = []
         """Log times of the messages around each: nothing says how many are missing of the former one."""
         self._publishers: frozenset[Hashable] = frozenset()
-        self._gone: frozenset[Hashable] = frozenset()
+        self._gone: dict[Hashable, None] = {}
         """Those that have gone, and whose sequences may still be there: which ones they are is not known."""
         self._settled = False
         """Whether none had come or gone at the last `collect`."""
@@ -196,15 +196,18 @@ class LossCounter:
                 there were meanwhile.
         """
         if again:
-            self._expected = _bounded(len(publishers | self._publishers | self._gone))
+            self._expected = _bounded(len(publishers | self._publishers | self._gone.keys()))
             self._sequences = [replace(each) for each in self._before]
             self._missing, self._restarts, self._aside = [], [], self._aside_before.copy()
             for message in self._recent:
                 self._take(*message)
-        self._gone = frozenset(islice((self._gone | self._publishers) - publishers, _MAX_GONE))
+        gone = {each: None for each in (*self._gone, *self._publishers) if each not in publishers}
+        self._gone = _newest(gone, _MAX_GONE)
         self._publishers, self._expected = publishers, _bounded(len(publishers) + len(self._gone))
         self._sequences.sort(key=lambda each: each.at_ns)
-        del self._sequences[: max(0, len(self._sequences) - self._expected)]
+        # A publisher that is forgotten takes a sequence with it: those that join would find no room.
+        forgotten = max(len(gone) - len(self._gone), len(self._sequences) - self._expected)
+        del self._sequences[: max(0, forgotten)]
         for each in self._sequences:
             each.heard = False
 
@@ -212,9 +215,9 @@ class LossCounter:
         """Forgets the sequences of publishers that have gone, once all that are there were heard since."""
         heard = [each for each in self._sequences if each.heard]
         if self._gone and len(heard) >= _bounded(len(self._publishers)):
-            self._sequences, self._gone = heard, frozenset()
+            self._sequences, self._gone = heard, {}
         # One that has sent nothing has no sequence.
-        self._gone = frozenset(islice(self._gone, len(self._sequences)))
+        self._gone = _newest(self._gone, len(self._sequences))
         self._expected = _bounded(len(self._publishers) + len(self._gone))
 
     def _set_aside(self, number: int, at_ns: int, published_ns: int) -> None:
@@ -294,6 +297,11 @@ def _likeness(sequence: _Sequence, published_ns: int) -> tuple[bool, int, bool]:
 def _may_follow(sequence: _Sequence, number: int, _at_ns: int, published_ns: int) -> bool:
     """Returns whether a message is from after the newest of a sequence, by number and by source time."""
     return number > sequence.last and published_ns >= sequence.published_ns
+
+
+def _newest(gone: dict[Hashable, None], count: int) -> dict[Hashable, None]:
+    """Returns as many of the publishers that went last."""
+    return dict(islice(gone.items(), max(0, len(gone) - count), None))
 
 
 def _bounded(publishers: int) -> int:

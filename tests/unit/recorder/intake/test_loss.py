@@ -461,6 +461,19 @@ def test_what_a_publisher_lost_while_the_graph_did_not_show_it_is_counted(counte
     assert lost(counter, both) == 199
 
 
+def test_restarts_beside_a_publisher_that_never_sends_are_no_gaps() -> None:
+    """The defect: later each was one, because publishers that were forgotten left their sequences behind."""
+    counter = LossCounter()
+    counter.collect(frozenset({"silent"}))
+    ats = count(1)
+    for run in range(40):
+        there: frozenset[Hashable] = frozenset({"silent", run})
+        assert counter.collect(there) is None
+        for number in range(1, 6):
+            counter.take(number, at := next(ats), at)
+        assert counter.collect(there) is None
+
+
 def test_what_has_gone_is_kept_in_bounds(counter: LossCounter) -> None:
     """Beside one that is silent, so that not all were heard."""
     counter.collect(frozenset({"silent", 0}))
