@@ -83,9 +83,16 @@ class LossCounter:
         self._missing: list[_Missing] = []
         self._restarts: list[tuple[int, int]] = []
         """Log times of the messages around each: nothing says how many are missing of the former one."""
-        self._publishers: frozenset[Hashable] = frozenset()
-        self._gone: dict[Hashable, None] = {}
-        """Those that have gone, and whose sequences may still be there: which ones they are is not known."""
+        self._publishers: dict[Hashable, int] = {}
+        """Those that the graph has, and how many sequences had begun for certain before each appeared."""
+        self._gone: dict[Hashable, int] = {}
+        """Those that have gone, likewise: their sequences may still be there, which ones is not known."""
+        self._begun = 0
+        """How many sequences have begun so far: none of a publisher that has sent nothing."""
+        self._begun_before = 0
+        """As it was at the last `collect`."""
+        self._begun_known = 0
+        """As it was at the last `collect` with publishers."""
         self._settled = False
         """Whether none had come or gone at the last `collect`."""
         self._expected = 1
@@ -150,6 +157,7 @@ class LossCounter:
             self._next(nearest, between, (number, at_ns, published_ns))
         elif may_be_first:
             self._sequences.append(_Sequence(number, at_ns, published_ns, self._settled))
+            self._begun += 1
         elif nearest:
             self._advance(nearest, *between, (number, at_ns, published_ns))
         elif not self._found(number, published_ns):
@@ -162,7 +170,7 @@ class LossCounter:
             publishers: identities of those that the graph has now; None if it can't be examined.
         """
         exact = publishers is not None
-        self._settled = publishers == self._publishers
+        self._settled = publishers == self._publishers.keys()
         # While the graph shows no publisher, the former ones stay known.
         if publishers and not self._settled:
             exact = len(self._recent) <= _MAX_RECENT
@@ -171,7 +179,9 @@ class LossCounter:
             self._forget_what_has_gone()
         missing, self._missing = self._missing, []
         restarts, self._restarts = self._restarts, []
-        self._before = [replace(each) for each in self._sequences]
+        self._before, self._begun_before = [replace(each) for each in self._sequences], self._begun
+        if publishers:
+            self._begun_known = self._begun
         self._aside = deque(
             (note for note in self._aside if any(_may_follow(each, *note) for each in self._sequences)),
             maxlen=_MAX_ASIDE,
@@ -195,15 +205,17 @@ class LossCounter:
             again: whether to go through what has come since the last `collect` once more, as of all that
                 there were meanwhile.
         """
+        known = self._gone | self._publishers
         if again:
-            self._expected = _bounded(len(publishers | self._publishers | self._gone.keys()))
-            self._sequences = [replace(each) for each in self._before]
+            self._expected = _bounded(len(publishers | known.keys()))
+            self._sequences, self._begun = [replace(each) for each in self._before], self._begun_before
             self._missing, self._restarts, self._aside = [], [], self._aside_before.copy()
             for message in self._recent:
                 self._take(*message)
-        gone = {each: None for each in (*self._gone, *self._publishers) if each not in publishers}
+        gone = {each: begun for each, begun in known.items() if each not in publishers}
         self._gone = _newest(gone, _MAX_GONE)
-        self._publishers, self._expected = publishers, _bounded(len(publishers) + len(self._gone))
+        self._publishers = {each: known.get(each, self._begun_known) for each in publishers}
+        self._expected = _bounded(len(publishers) + len(self._gone))
         self._sequences.sort(key=lambda each: each.at_ns)
         # A publisher that is forgotten takes a sequence with it: those that join would find no room.
         forgotten = max(len(gone) - len(self._gone), len(self._sequences) - self._expected)
@@ -217,7 +229,8 @@ class LossCounter:
         if self._gone and len(heard) >= _bounded(len(self._publishers)):
             self._sequences, self._gone = heard, {}
         # One that has sent nothing has no sequence.
-        self._gone = _newest(self._gone, len(self._sequences))
+        sent = {each: begun for each, begun in self._gone.items() if begun < self._begun}
+        self._gone = _newest(sent, len(self._sequences))
         self._expected = _bounded(len(self._publishers) + len(self._gone))
 
     def _set_aside(self, number: int, at_ns: int, published_ns: int) -> None:
@@ -260,6 +273,7 @@ class LossCounter:
             self._restarts.append((oldest.at_ns, at_ns))
         oldest.last, oldest.at_ns, oldest.published_ns = number, at_ns, published_ns
         oldest.heard = self._settled
+        self._begun += 1
 
     def _found(self, number: int, published_ns: int) -> bool:
         """Removes a message from the missing ones; returns whether it was one."""
@@ -299,7 +313,7 @@ def _may_follow(sequence: _Sequence, number: int, _at_ns: int, published_ns: int
     return number > sequence.last and published_ns >= sequence.published_ns
 
 
-def _newest(gone: dict[Hashable, None], count: int) -> dict[Hashable, None]:
+def _newest(gone: dict[Hashable, int], count: int) -> dict[Hashable, int]:
     """Returns as many of the publishers that went last."""
     return dict(islice(gone.items(), max(0, len(gone) - count), None))
 

@@ -474,6 +474,37 @@ def test_restarts_beside_a_publisher_that_never_sends_are_no_gaps() -> None:
         assert counter.collect(there) is None
 
 
+@pytest.mark.parametrize("silent_at", [700, 50])
+def test_a_publisher_that_left_without_a_message_changes_no_count(silent_at: int) -> None:
+    """The defect: it was waited for, and what another one lost was taken for its first message."""
+    both: frozenset[Hashable] = frozenset({"a", "silent"})
+    counter = LossCounter()
+    counter.collect(both)
+    take(counter, [100, silent_at])
+    for graph, number in [(both, 101), (both | {"b"}, 102), (both | {"b"}, 103), (both, 104)]:
+        assert counter.collect(graph) is None
+        take(counter, [number])
+    assert counter.collect(both) is None
+    take(counter, [105, 107, 108])
+    assert lost(counter, both) == 1
+    take(counter, [109, silent_at + 1])
+    assert counter.collect(both) is None
+
+
+def test_a_first_message_that_comes_after_its_publisher_left_is_no_gap() -> None:
+    both: frozenset[Hashable] = frozenset({"a", "silent"})
+    counter = LossCounter()
+    counter.collect(both)
+    take(counter, [100, 700])
+    for graph, number in [(both, 101), (both | {"b"}, 102), (both, 1)]:
+        assert counter.collect(graph) is None
+        take(counter, [number])
+    for number in (103, 701):
+        assert counter.collect(both) is None
+        take(counter, [number])
+    assert counter.collect(both) is None
+
+
 def test_what_has_gone_is_kept_in_bounds(counter: LossCounter) -> None:
     """Beside one that is silent, so that not all were heard."""
     counter.collect(frozenset({"silent", 0}))
