@@ -2,7 +2,8 @@
 
 DDS numbers the messages of each publisher (DDSI-RTPS 8.3.5.4). rclpy hands the number over, but not the
 publisher. Of one publisher the count is exact. Of several, each number is taken for the next of the sequence
-that it fits best: exact while their numbers are apart, close otherwise, and 0 where nothing was lost.
+that it fits best: exact while their numbers are far apart, once each was heard and while none joins or
+leaves, and close otherwise, mostly. Where nothing was lost it is 0, but for rare cases of late history.
 
 A publisher that has gone counts as one that is silent, until all that are there were heard: which sequence
 was its own is not known. When the graph shows others, the numbers since it was looked at last are gone
