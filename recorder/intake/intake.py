@@ -142,6 +142,10 @@ class Intake:
             found = selected(self._node, self._presets, wanted)
         except Exception as error:  # noqa: BLE001  # what other programs announce can be anything
             self._found[""] = f"the topics can't be listed: {type(error).__name__}: {error}"
+            for entry in self._entries.values():
+                # All the same: what a source keeps of its messages until it is asked grows with each.
+                if loss := entry.source.lost(None):
+                    self._put([loss])
             return
         if found.problem:
             self._found[""] = found.problem

@@ -396,6 +396,29 @@ def test_how_many_are_lost_is_unknown_while_the_publishers_are(talker: Talker, t
         assert {each.messages for each in told()} == {None}
 
 
+def test_what_is_lost_is_reported_while_the_topics_cannot_be_listed(
+    talker: Talker, taken: Taken, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The defect: all numbers were kept until they could, and what was lost was reported then."""
+    publisher = talker.publisher("/value", Int32)
+    subscribed(publisher)
+    publisher.publish(Int32(data=-1))
+    wait_until(lambda: taken.samples("/value"), "a message")
+
+    def fail(*_: object) -> Any:
+        raise RuntimeError("no graph")
+
+    monkeypatch.setattr("recorder.intake.intake.selected", fail)
+    wait_until(lambda: "no graph" in taken.intake.problems.get("", ""), "the topics can't be listed")
+    stall(taken, publisher, Int32())
+
+    def losses() -> list[Loss]:
+        return [each for each in list(taken.items) if isinstance(each, Loss)]
+
+    wait_until(losses, "a loss")
+    assert {(each.channel and each.channel.topic, each.messages) for each in losses()} == {("/value", None)}
+
+
 def taken_and_lost(taken: Taken, hz: int, size: int, count: int) -> tuple[int, int]:
     """Has another process publish, and returns the numbers when they add up to what it has published."""
     command = [
