@@ -28,6 +28,8 @@ _MAX_RECENT: Final = 100_000
 """Numbers that are kept to go through them again: those of a second, at up to 100 kHz."""
 _MAX_ASIDE: Final = 5_000
 """Messages that are kept although they may be history: those of ten seconds, at up to 500 Hz."""
+_MAX_COMPARED: Final = 20
+"""With more sequences, no such message is kept: each would be compared with each of them, time and again."""
 
 _Note = tuple[int, int, int]
 """Number, log time and source time of a message."""
@@ -159,6 +161,8 @@ class LossCounter:
         elif may_be_first:
             self._sequences.append(_Sequence(number, at_ns, published_ns, self._settled))
             self._begun += 1
+            if len(self._sequences) > _MAX_COMPARED:
+                self._aside.clear()
         elif nearest:
             self._advance(nearest, *between, (number, at_ns, published_ns))
         elif not self._found(number, published_ns):
@@ -236,7 +240,7 @@ class LossCounter:
 
     def _set_aside(self, number: int, at_ns: int, published_ns: int) -> None:
         """Keeps a message that may be history, unless it was missing."""
-        if not self._found(number, published_ns):
+        if not self._found(number, published_ns) and len(self._sequences) <= _MAX_COMPARED:
             self._aside.append((number, at_ns, published_ns))
 
     def _nearest(

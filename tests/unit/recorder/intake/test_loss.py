@@ -3,6 +3,7 @@
 from collections.abc import Hashable, Sequence
 from itertools import count
 from random import Random
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -303,6 +304,31 @@ def test_what_may_be_history_is_kept_in_bounds(monkeypatch: pytest.MonkeyPatch) 
         counter.take(number, number, published_ns=100 + number, maybe_history=True)
     counter.take(28, 28, published_ns=128)
     assert lost(counter, frozenset({"a", "b"})) == 11, "those that were forgotten, too"
+
+
+@pytest.mark.parametrize("publishers", [20, 256])
+def test_the_work_for_what_may_be_history_is_kept_in_bounds(
+    monkeypatch: pytest.MonkeyPatch, publishers: int
+) -> None:
+    """The defect: each of these messages was compared with each of the sequences, for every gap."""
+    compare, compared = loss._may_follow, 0
+
+    def may_follow(*each: Any) -> bool:
+        nonlocal compared
+        compared += 1
+        return compare(*each)
+
+    monkeypatch.setattr(loss, "_may_follow", may_follow)
+    counter = LossCounter()
+    graph: frozenset[Hashable] = frozenset(range(publishers))
+    counter.collect(graph)
+    for beginning in range(publishers):
+        counter.take(10 + beginning * 1_000, 0, published_ns=1)
+    for number in range(100):
+        counter.take(20 + number, number, published_ns=2, aside=True)
+    counter.take(publishers * 1_000, 1_000, published_ns=3)
+    assert counter.collect(graph)
+    assert compared <= 2 * 20 * 100
 
 
 def test_where_messages_have_no_numbers_nothing_is_counted(counter: LossCounter) -> None:
