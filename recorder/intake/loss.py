@@ -132,14 +132,21 @@ class LossCounter:
             return
         if len(self._recent) <= _MAX_RECENT:
             self._recent.append((number, at_ns, published_ns, maybe_history, aside))
-        if (
-            len(self._sequences) == 1
-            and self._sequences[0].last == number - 1
-            and not (maybe_history or aside)
-        ):
-            self._next(self._sequences[0], [], (number, at_ns, published_ns))  # as nearly always
+        if not (maybe_history or aside) and (sequence := self._followed_by(number)):
+            # As nearly always: what `_take` would do, without its comparisons.
+            self._next(sequence, [], (number, at_ns, published_ns))
         else:
             self._take(number, at_ns, published_ns, maybe_history, aside)
+
+    def _followed_by(self, number: int) -> _Sequence | None:
+        """Returns the only sequence whose next number it is, unless it is the newest of another one."""
+        found = None
+        for each in self._sequences:
+            if each.last == number or (found and each.last == number - 1):
+                return None
+            if each.last == number - 1:
+                found = each
+        return found
 
     def _take(self, number: int, at_ns: int, published_ns: int, maybe_history: bool, aside: bool) -> None:
         if aside:

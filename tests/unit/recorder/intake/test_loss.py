@@ -4,6 +4,7 @@ from collections.abc import Hashable, Sequence
 from itertools import count
 from random import Random
 from typing import Any
+from unittest.mock import patch
 
 import pytest
 from hypothesis import given
@@ -557,6 +558,30 @@ def test_taken_and_lost_are_what_was_published(
 ) -> None:
     counted, missing = counted_and_lost(apart[:count], dropped, order)
     assert counted == missing
+
+
+@given(
+    messages=st.lists(st.tuples(st.integers(1, 4), st.integers(1, 3)), min_size=3, max_size=20),
+    publishers=st.integers(1, 3),
+    looks=st.sets(st.integers(0, 19)),
+)
+def test_the_short_way_of_the_usual_message_leads_to_the_same(
+    messages: list[tuple[int, int]], publishers: int, looks: set[int]
+) -> None:
+    graph: frozenset[Hashable] = frozenset(range(publishers))
+
+    def found(counter: LossCounter) -> list[Any]:
+        counter.collect(graph)
+        seen: list[Any] = []
+        for at, (number, published_ns) in enumerate(messages):
+            counter.take(number, at, published_ns)
+            if at in looks:
+                seen.append(counter.collect(graph))
+        return [*seen, counter.collect(graph), counter._sequences]
+
+    long_way = LossCounter()
+    with patch.object(long_way, "_followed_by", lambda _: None):
+        assert found(LossCounter()) == found(long_way)
 
 
 @given(sent=st.integers(0, 200), beginnings=st.lists(st.integers(1, 20), min_size=1, max_size=4), order=ORDER)
