@@ -8,7 +8,7 @@ from rclpy.qos import DurabilityPolicy
 
 from common.receive_time import Instant, received_at
 from common.ros_node import subscribe_raw
-from recorder.intake.loss import LossCounter
+from recorder.intake.loss import Kind, LossCounter
 from recorder.intake.qos import FIRST_DEPTH, MAX_BYTES, depth_for, is_latched, offered_qos, profile_of
 from recorder.values import Channel, GapCause, Loss, Sample
 
@@ -77,7 +77,7 @@ class Source:
             Exception: rclpy's; nothing has been taken.
         """
         present, following = self._drain_both(now)
-        self._count(self._uncounted(present), self._history_ends_at_s is not None)
+        self._count(self._uncounted(present), maybe_history=self._history_ends_at_s is not None)
         if self._history_ends_at_s is not None and now.monotonic_s >= self._history_ends_at_s:
             self._history_ends_at_s = None
         samples = self._fresh(present)
@@ -85,7 +85,7 @@ class Source:
             more = self._fresh(following)
             switches = now.monotonic_s >= self._switch_at_s
             if switches:
-                self._count(more, self._history_until_ns is not None)
+                self._count(more, maybe_history=self._history_until_ns is not None)
             else:
                 self._count_following(more)
             samples += more
@@ -158,25 +158,24 @@ class Source:
                 # Before its history comes, which later segments are to begin with.
                 self.channel = replace(self.channel, latched=True, offered_qos=offered_qos(offers))
 
-    def _count(self, samples: Sequence[Sample], maybe_history: bool) -> None:
+    def _count(self, samples: Sequence[Sample], *, maybe_history: bool) -> None:
+        kind = Kind.MAYBE_HISTORY if maybe_history else Kind.LIVE
         for each in samples:
-            self._loss.take(
-                each.sequence, each.log_time_ns, each.publish_time_ns, maybe_history=maybe_history
-            )
+            self._loss.take(each.sequence, each.log_time_ns, each.publish_time_ns, kind)
             self._newest_ns = max(self._newest_ns, each.publish_time_ns)
 
     def _count_following(self, samples: Sequence[Sample]) -> None:
         """Counts what the next subscription has, and sets aside what may be history."""
         until_ns = self._history_until_ns
         if until_ns is None:
-            self._count(samples, False)
+            self._count(samples, maybe_history=False)
             return
         withheld = [each for each in samples if each.publish_time_ns <= until_ns]
         for each in withheld:
             # It may be live, and the queue of the present subscription too full for it.
-            self._loss.take(each.sequence, each.log_time_ns, each.publish_time_ns, aside=True)
+            self._loss.take(each.sequence, each.log_time_ns, each.publish_time_ns, Kind.ASIDE)
         _remember(self._withheld, withheld)
-        self._count([each for each in samples if each.publish_time_ns > until_ns], True)
+        self._count([each for each in samples if each.publish_time_ns > until_ns], maybe_history=True)
 
     def _uncounted(self, samples: list[Sample]) -> list[Sample]:
         """Returns those of the present subscription that were not counted when the next one had them."""

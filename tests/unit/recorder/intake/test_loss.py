@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from recorder.intake import loss
-from recorder.intake.loss import LossCounter
+from recorder.intake.loss import Kind, LossCounter
 
 
 def lost(counter: LossCounter, publishers: frozenset[Hashable] | None) -> int:
@@ -257,7 +257,7 @@ def test_one_that_is_missing_of_those_that_may_be_history_is_one(graph: frozense
     counter.take(700, 0, published_ns=1_000)
     counter.take(6, 1, published_ns=106)
     for number in range(8, 20):
-        counter.take(number, number, published_ns=100 + number, maybe_history=True)
+        counter.take(number, number, published_ns=100 + number, kind=Kind.MAYBE_HISTORY)
         assert counter.collect(frozenset({"a", "b"})) is None, "not known yet whether it is history"
     counter.take(20, 20, published_ns=120)
     found = counter.collect(graph)
@@ -273,9 +273,9 @@ def test_what_came_by_another_way_is_neither_missing_nor_the_newest(
 ) -> None:
     take(counter, [1])
     for number, aside in [(2, True), (4, False)] if first else [(4, False), (2, True)]:
-        counter.take(number, number * 10, aside=aside)
+        counter.take(number, number * 10, kind=Kind.ASIDE if aside else Kind.LIVE)
     for number in (5, 6):
-        counter.take(number, number * 10, aside=True)
+        counter.take(number, number * 10, kind=Kind.ASIDE)
     counter.take(5, 50)
     found = counter.collect(ONE)
     assert found
@@ -288,10 +288,10 @@ def test_history_of_one_publisher_finds_nothing_of_what_another_lacks() -> None:
     counter.take(700, 0, published_ns=1_000)
     counter.take(600, 1, published_ns=5_000)
     for number in range(605, 651):
-        counter.take(number, number, published_ns=300 + number, maybe_history=True)
+        counter.take(number, number, published_ns=300 + number, kind=Kind.MAYBE_HISTORY)
     counter.take(611, 1_000, published_ns=6_000)
     for number in (605, 606):
-        counter.take(number, 1_001, published_ns=300 + number, maybe_history=True)
+        counter.take(number, 1_001, published_ns=300 + number, kind=Kind.MAYBE_HISTORY)
     assert lost(counter, frozenset({"a", "b"})) == 10
 
 
@@ -302,7 +302,7 @@ def test_what_may_be_history_is_kept_in_bounds(monkeypatch: pytest.MonkeyPatch) 
     counter.take(700, 0, published_ns=1_000)
     counter.take(6, 1, published_ns=106)
     for number in range(8, 28):
-        counter.take(number, number, published_ns=100 + number, maybe_history=True)
+        counter.take(number, number, published_ns=100 + number, kind=Kind.MAYBE_HISTORY)
     counter.take(28, 28, published_ns=128)
     assert lost(counter, frozenset({"a", "b"})) == 11, "those that were forgotten, too"
 
@@ -326,7 +326,7 @@ def test_the_work_for_what_may_be_history_is_kept_in_bounds(
     for beginning in range(publishers):
         counter.take(10 + beginning * 1_000, 0, published_ns=1)
     for number in range(100):
-        counter.take(20 + number, number, published_ns=2, aside=True)
+        counter.take(20 + number, number, published_ns=2, kind=Kind.ASIDE)
     counter.take(publishers * 1_000, 1_000, published_ns=3)
     assert counter.collect(graph)
     assert compared <= 2 * 20 * 100
