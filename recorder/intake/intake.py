@@ -168,6 +168,7 @@ class Intake:
         topic, type_name = key
         offers = self._offers(key)
         entry = self._entries.get(key)
+        loss = None
         try:
             if entry is None and (offers or offers is None):
                 self._make_way(key, now)
@@ -186,9 +187,10 @@ class Intake:
             self._found[topic] = (
                 f"{topic} can't be subscribed as {type_name}: {type(error).__name__}: {error}"
             )
-        else:
-            if loss:
-                self._put([loss])
+            # The subscription that there is goes on, and so does the count of what it loses.
+            loss = entry.source.lost(offers) if entry else None
+        if loss:
+            self._put([loss])
 
     def _make_way(self, key: _Key, now: Instant) -> None:
         """Ends the subscription to another type of the topic that has no publishers any more.

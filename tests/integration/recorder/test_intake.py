@@ -419,6 +419,27 @@ def test_what_is_lost_is_reported_while_the_topics_cannot_be_listed(
     assert {(each.channel and each.channel.topic, each.messages) for each in losses()} == {("/value", None)}
 
 
+def test_what_is_lost_is_reported_while_a_topic_cannot_be_subscribed_anew(
+    talker: Talker, taken: Taken, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    best_effort = QoSProfile(reliability=ReliabilityPolicy.BEST_EFFORT, depth=100)
+    sensor = talker.node.create_publisher(Int32, "/value", best_effort)
+    publisher = talker.publisher("/value", Int32)
+    for each in (sensor, publisher):
+        subscribed(each)
+        each.publish(Int32(data=-1))
+    wait_until(lambda: len(taken.samples("/value")) == 2, "a message of each")
+
+    def fail(*_: object) -> Any:
+        raise RuntimeError("no subscription")
+
+    monkeypatch.setattr("recorder.intake.source.subscribe_raw", fail)
+    talker.node.destroy_publisher(sensor)  # A reliable subscription is to take the place of this one.
+    wait_until(lambda: "no subscription" in taken.intake.problems.get("/value", ""), "a problem")
+    stall(taken, publisher, Int32())
+    wait_until(lambda: taken.lost("/value"), "a loss")
+
+
 def taken_and_lost(taken: Taken, hz: int, size: int, count: int) -> tuple[int, int]:
     """Has another process publish, and returns the numbers when they add up to what it has published."""
     command = [
