@@ -9,7 +9,7 @@
 | the cursor is gone as well | the new one begins with the gateway's next event |
 | it is lost while the bridge runs | what the old one had comes from the gateway once more, or is a gap |
 | an event's payload is changed | a gap takes its place when it is to be sent |
-| a row's run or number is changed | put right if its neighbours fit each other; otherwise damaged |
+| a row's run or number is changed | damaged, where it makes no sense or is the newest row's |
 | a count or a command is changed | the count begins anew; the command has no result |
 | the position is changed | damaged |
 | a kill amid a new cursor left a file | removed at the next start |

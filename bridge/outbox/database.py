@@ -13,9 +13,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from bridge.outbox import commands, meta, order
+from bridge.outbox import commands, meta
 from bridge.outbox.cursor import Cursor, read_cursor, remove_leftovers, write_cursor
-from bridge.outbox.items import all_make_sense, batch_between, drop_oldest, first_batch, insert, lose, restore
+from bridge.outbox.items import (
+    all_make_sense,
+    batch_between,
+    drop_oldest,
+    first_batch,
+    insert,
+    lose,
+    newest_place,
+    restore,
+)
 from bridge.outbox.schema import TABLES, VERSION
 from bridge.values import Batch, DropReason, Event, Gap, Item, OutboxError, Position
 from common.private_files import make_directory
@@ -380,11 +389,11 @@ class Database:
         restore(db)
         if not meta.position_makes_sense(db):
             raise _DamagedError("its position makes no sense")
-        position = meta.get(db, "run_id"), meta.get(db, "sequence")
-        if not order.restored(db, position, (cursor.run_id, cursor.last) if cursor.last_id else None):
-            raise _DamagedError("its rows are not in order")
         if not all_make_sense(db):
             raise _DamagedError("a row makes no sense")
+        sent = (cursor.run_id, cursor.last) if cursor.last_id else None
+        if (newest_place(db) or sent) not in (None, (meta.get(db, "run_id"), meta.get(db, "sequence"))):
+            raise _DamagedError("its position is not the one after what it has")
         (events,) = db.execute("SELECT count(*) FROM items WHERE payload IS NOT NULL").fetchone()
         meta.put(db, "events", events)
         db.execute("COMMIT")

@@ -51,6 +51,14 @@ def all_make_sense(db: sqlite3.Connection) -> bool:
     return not wrong
 
 
+def newest_place(db: sqlite3.Connection) -> tuple[str, int] | None:
+    """Returns the run of the newest item and the sequence at which it ends; None if there is none."""
+    newest: tuple[str, int] | None = db.execute(
+        "SELECT run_id, last FROM items ORDER BY id DESC LIMIT 1"
+    ).fetchone()
+    return newest
+
+
 def insert(db: sqlite3.Connection, item: Item) -> None:
     """Adds an item at the end."""
     if isinstance(item, Event):

@@ -168,11 +168,3 @@ async def test_an_event_that_the_disk_has_changed_becomes_a_gap(tmp_path: Path, 
     assert gap.dropped.reason == DROP_REASON_OUTBOX_LOST
     assert gap.dropped.worst_severity == 1
     assert (facts.events, facts.sent, facts.dropped) == (0, 2, 1)
-
-
-async def test_an_event_whose_row_is_of_another_run_is_sent_all_the_same(tmp_path: Path) -> None:
-    """The defect: it was lost without a gap, and a gap of a run that there never was came in its place."""
-    (batch,), facts = await all_sent(tmp_path, "run_id", "rum")
-    assert (batch.run_id, batch.first_sequence, batch.last_sequence) == ("run", 1, 3)
-    assert [each.event.sequence for each in batch.items] == [1, 2, 3]
-    assert (facts.events, facts.sent, facts.dropped) == (0, 3, 0)
