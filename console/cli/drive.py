@@ -7,6 +7,7 @@ from typing import Annotated, Any, Final
 import typer
 
 from common.errors import ExitCode, UserError
+from common.tasks import cancel
 from console.cli import drive_terminal
 from console.cli.drive_input import Controls, Input, controls
 from console.cli.drive_keys import Action, Hands
@@ -154,6 +155,8 @@ class _Cockpit:
         self._begun = False
         """Whether the robot was ready once: a key that is down before would be a hold without a beginning."""
         self._calls: set[asyncio.Task[None]] = set()
+        self._failed_stop = ""
+        """Why a stop has failed after the end of driving, when no line shows it any more; empty: none has."""
         self._ending = False
 
     async def run(self) -> None:
@@ -161,19 +164,25 @@ class _Cockpit:
 
         Raises:
             GatewayError: The session has ended.
+            UserError: The robot has not confirmed the last stop.
         """
         keyboard = Keyboard()
         keyboard.take()
         try:
+            # To the end of the calls: a second signal is not to end a stop that is on its way.
             with handled(dict.fromkeys(ENDING, self._end)):
-                async with drive_terminal.reporting_keys(keyboard, self._take_late) as hands:
-                    with drive_terminal.reading(keyboard, lambda typed: self._take(typed, hands)):
-                        await self._drive(hands)
+                try:
+                    async with drive_terminal.reporting_keys(keyboard, self._take_late) as hands:
+                        with drive_terminal.reading(keyboard, lambda typed: self._take(typed, hands)):
+                            await self._drive(hands)
+                finally:
+                    await self._finish_calls()
         finally:
             keyboard.give_back()
-            await self._finish_calls()
             if not self._session.as_json:
                 print(file=self._session.out.file)
+        if self._failed_stop:
+            raise UserError(f"the stop is not confirmed: {self._failed_stop}")
 
     async def _drive(self, hands: Hands) -> None:
         """Drives until the end; then releases first: a terminal that is frozen may hold up all else."""
@@ -237,14 +246,18 @@ class _Cockpit:
         """Gives calls that are on their way a moment: a stop may have been the last of them."""
         if self._calls:
             await asyncio.wait(self._calls, timeout=_LAST_CALLS_S)
-        for call in self._calls:
-            call.cancel()
+        await cancel(self._calls)
 
     async def _stop(self, reason: str) -> None:
         try:
             self._note = (await self._client.stop_robot(reason)).message
         except GatewayError as error:
             self._note = str(error)
+            if self._ending:
+                self._failed_stop = self._note
+        except asyncio.CancelledError:
+            self._failed_stop = f"no answer within {_LAST_CALLS_S:g} s"
+            raise
 
     async def _reset(self, stop_id: int) -> None:
         try:

@@ -2,16 +2,23 @@
 
 import asyncio
 import io
+import os
+import signal
 import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import pytest
 from rich.console import Console
 
+from common.errors import UserError
 from console.cli.drive import _Cockpit
 from console.cli.drive_input import Controls, Input
 from console.cli.drive_keys import Action, Hands, Liveness
+from console.client import Unreachable
 from console.client.results import DriveLimits, DrivePhase
 
 EACH_LIMIT: dict[str, Any] = dict.fromkeys(DriveLimits.__slots__, 0.2)
@@ -104,3 +111,61 @@ async def test_a_stop_goes_out_also_where_driving_ends_at_once(
     await cockpit._finish_calls()
     assert robot.stops == ["by the driver's keyboard"]
     assert not robot.resets
+
+
+@asynccontextmanager
+async def _of_taps(*_: object) -> AsyncIterator[Hands]:
+    yield Hands(releases=False)
+
+
+async def run_until_a_stop(monkeypatch: pytest.MonkeyPatch, robot: Any) -> None:
+    """Drives without a terminal; Space is the last key."""
+    monkeypatch.setattr("console.cli.drive.Keyboard", MagicMock())
+    monkeypatch.setattr("console.cli.drive.drive_terminal.reporting_keys", _of_taps)
+    monkeypatch.setattr("console.cli.drive.drive_terminal.reading", MagicMock())
+    session: Any = SimpleNamespace(as_json=True)
+    cockpit = _Cockpit(session, robot, robot, (None, None), Controls(Input.KEYBOARD, None))
+
+    async def drive(hands: Hands) -> None:
+        cockpit._take(" x", hands)
+
+    monkeypatch.setattr(cockpit, "_drive", drive)
+    await cockpit.run()
+
+
+@pytest.mark.parametrize("answers", [False, True])
+async def test_a_stop_that_fails_after_the_end_of_driving_is_an_error(
+    monkeypatch: pytest.MonkeyPatch, answers: bool
+) -> None:
+    """The defect: it failed without a word, and the driver believed that the robot had stopped."""
+    monkeypatch.setattr("console.cli.drive._LAST_CALLS_S", 15.0 if answers else 0.05)
+    robot: Any = Robot()
+
+    async def stop_robot(_: str) -> Any:
+        if answers:
+            raise Unreachable("no route")
+        await asyncio.Event().wait()
+
+    robot.stop_robot = stop_robot
+    why = "no route" if answers else "no answer within 0.05 s"
+    with pytest.raises(UserError, match=f"the stop is not confirmed: {why}"):
+        await run_until_a_stop(monkeypatch, robot)
+
+
+async def test_a_second_signal_ends_no_stop_that_is_on_its_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The defect: the handlers had gone by then. The signal here is one that does nothing without them."""
+    monkeypatch.setattr("console.cli.drive._LAST_CALLS_S", 15.0)
+    monkeypatch.setattr("console.cli.drive.ENDING", (signal.SIGURG,))
+    ended = asyncio.Event()
+    monkeypatch.setattr(_Cockpit, "_end", lambda _: ended.set())
+    robot: Any = Robot()
+
+    async def stop_robot(reason: str) -> Any:
+        os.kill(os.getpid(), signal.SIGURG)
+        await asyncio.wait_for(ended.wait(), 10)
+        robot.stops.append(reason)
+        return SimpleNamespace(message="")
+
+    robot.stop_robot = stop_robot
+    await run_until_a_stop(monkeypatch, robot)
+    assert robot.stops == ["by the driver's keyboard"]

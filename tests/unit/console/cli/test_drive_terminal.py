@@ -182,3 +182,18 @@ async def test_space_counts_also_while_the_last_answer_is_awaited(monkeypatch: p
             drive_terminal.ask(hands.ask(time.monotonic() + 1.0))
         keyboard.give_back()
     assert late == [Action.STOP]
+
+
+async def test_ctrl_s_holds_up_neither_the_program_nor_its_keys(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The defect: the next request to the terminal hung, and with it the loop that reads Space."""
+    async with screen(monkeypatch, None) as shown:
+        keyboard = Keyboard()
+        keyboard.take()
+        try:
+            shown.press("\x13 ")
+            assert keyboard.typed() == "\x13 "
+            os.set_blocking(keyboard.fileno, False)
+            os.write(keyboard.fileno, b"asked")
+        finally:
+            keyboard.give_back()
+        await has(shown, "asked")
