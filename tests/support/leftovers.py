@@ -97,6 +97,8 @@ def _unnamed() -> str:
 
 
 def _collect() -> None:
+    # A program that ran in this process has frozen what there was.
+    gc.unfreeze()
     gc.collect()
     # Windows that were closed are freed by Qt's event loop, which runs only in tests that want it to.
     if qt := sys.modules.get("PySide6.QtCore"):
