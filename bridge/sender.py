@@ -14,9 +14,9 @@ import time
 from collections.abc import Awaitable, Callable
 
 from bridge.encoding import batch_message, is_whole
-from bridge.jittered_backoff import JitteredBackoff
 from bridge.outbox.outbox import Outbox
 from bridge.values import Event, OutboxError
+from common.jittered_backoff import JitteredBackoff
 from fleet.connection import Hub, Published
 from fleet.errors import HubError
 from fleet.names import event_subject, result_subject

@@ -5,10 +5,10 @@ import logging
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, Protocol
 
-from bridge.jittered_backoff import JitteredBackoff
 from bridge.robot.calls import GatewayCalls
 from bridge.uploads.queue import RUNNING, State, Upload
 from common.errors import DomainError, NotFoundError, PreconditionError, RecorderUnreachableError
+from common.jittered_backoff import JitteredBackoff
 from common.reasons import Reason
 from console.client import GatewayError
 from omniseer.bridge.v1 import bridge_service_pb2 as bridge_pb

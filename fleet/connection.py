@@ -23,8 +23,8 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, Final
 
-from common.backoff import Backoff
 from common.broadcast import Broadcast
+from common.jittered_backoff import JitteredBackoff
 from common.tasks import cancel
 from fleet import consuming, direct
 from fleet.consuming import Delivery
@@ -50,8 +50,6 @@ __all__ = [
     "connect",
 ]
 
-FIRST_PAUSE_S: Final = 1.0
-LONGEST_PAUSE_S: Final = 60.0
 REQUEST_TIMEOUT_S: Final = 5.0
 """For an answer of the hub. A stream elects a leader in about that time."""
 _STEADY_S: Final = 10.0
@@ -254,7 +252,7 @@ class Hub:
             start: where to begin.
         """
         place = start
-        pause = Backoff(FIRST_PAUSE_S, LONGEST_PAUSE_S)
+        pause = JitteredBackoff()
         while True:
             await self.connected()
             since_s = asyncio.get_running_loop().time()
@@ -266,7 +264,7 @@ class Hub:
                         place = Start.after(message.sequence)
                         yield message
             except HubError:
-                await self._pause_with_jitter(pause, since_s)
+                await self._pause_after(pause, since_s)
 
     async def last(
         self, stream: str, subjects: str, timeout_s: float = REQUEST_TIMEOUT_S
@@ -288,7 +286,7 @@ class Hub:
 
     async def pull(self, stream: str, durable: str, batch: int = 16) -> AsyncGenerator[Delivery, None]:
         """Yields the messages of a durable consumer, over all lost connections. Each needs its `ack`."""
-        pause = Backoff(FIRST_PAUSE_S, LONGEST_PAUSE_S)
+        pause = JitteredBackoff()
         while True:
             await self.connected()
             since_s = asyncio.get_running_loop().time()
@@ -298,7 +296,7 @@ class Hub:
                         pause.reset()
                         yield delivery
             except HubError:
-                await self._pause_with_jitter(pause, since_s)
+                await self._pause_after(pause, since_s)
 
     async def request(self, subject: str, payload: bytes, timeout_s: float = REQUEST_TIMEOUT_S) -> bytes:
         """Sends a request to another program and returns its answer.
@@ -394,13 +392,12 @@ class Hub:
 
     async def run(self) -> None:
         """Keeps a connection until it is cancelled."""
-        backoff = Backoff(FIRST_PAUSE_S, LONGEST_PAUSE_S)
+        backoff = JitteredBackoff()
         loop = asyncio.get_running_loop()
         while True:
             session = await self._try_servers()
             if session is None:
-                # Equal jitter, between half and all of it: a fleet does not come back in step.
-                await asyncio.sleep(backoff.next_s() * random.uniform(0.5, 1.0))  # noqa: S311
+                await backoff.wait()
                 continue
             since_s = loop.time()
             try:
@@ -410,7 +407,7 @@ class Hub:
             if loop.time() - since_s >= _STEADY_S:
                 backoff.reset()
             else:
-                await asyncio.sleep(backoff.next_s() * random.uniform(0.5, 1.0))  # noqa: S311
+                await backoff.wait()
 
     def supervise(self) -> asyncio.Task[None]:
         """Begins to keep a connection; returns the task, which its owner cancels."""
@@ -442,11 +439,10 @@ class Hub:
         # One that was lost because it is silent is silent to a new connection as well.
         servers.sort(key=lambda server: server == self._last_server)
         try:
-            session = await first_to_open(servers, self._open_session)
+            return await first_to_open(servers, self._open_session)
         except HubError as error:
             self._set(False, "", error)
             return None
-        return session
 
     async def _open_session(self, server: str) -> Session:
         address = self._address
@@ -508,8 +504,8 @@ class Hub:
             raise UnreachableError(self._link.text or "there is no connection to the hub yet")
         return self._session
 
-    async def _pause_with_jitter(self, backoff: Backoff, since_s: float) -> None:
-        """As `pause`, between half and all of the next pause: a fleet does not come back in step.
+    async def _pause_after(self, backoff: JitteredBackoff, since_s: float) -> None:
+        """As `pause`, for the next pause of a backoff, which begins anew after a success.
 
         Args:
             backoff: of what has failed.
@@ -517,7 +513,7 @@ class Hub:
         """
         if asyncio.get_running_loop().time() - since_s >= _STEADY_S:
             backoff.reset()
-        await self.pause(backoff.next_s() * random.uniform(0.5, 1.0))  # noqa: S311
+        await self.pause(backoff.next_s())
 
 
 @asynccontextmanager

@@ -10,8 +10,8 @@ from bridge.commands.hub_time import HubTime, age_s, hub_time
 from bridge.commands.judgement import Denial, Judgement, Request, Stray, judge
 from bridge.commands.pending_requests import Pending, PendingRequests
 from bridge.config import BridgeSettings
-from bridge.jittered_backoff import JitteredBackoff
 from bridge.values import OutboxError
+from common.jittered_backoff import JitteredBackoff
 from common.suspend import elapsed_s
 from common.token_bucket import TokenBucket
 from fleet.connection import Delivery, Hub

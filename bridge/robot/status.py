@@ -4,9 +4,9 @@ import logging
 from typing import Any, Final
 
 from bridge.config import GatewaySettings
-from bridge.jittered_backoff import JitteredBackoff
 from bridge.robot.gateway import STATUS_SILENT_S, explained, statuses
 from common.errors import UserError
+from common.jittered_backoff import JitteredBackoff
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus
 
 _log = logging.getLogger(__name__)

@@ -23,7 +23,6 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Final
 
-from bridge.jittered_backoff import JitteredBackoff
 from bridge.uploads import gates
 from bridge.uploads.attempt import Attempt, Parties, RecordingSource, ended
 from bridge.uploads.config import UploadSettings
@@ -44,6 +43,7 @@ from bridge.uploads.receivers import Receivers, Requests
 from bridge.uploads.route import interface_to
 from bridge.uploads.selection import differs, is_known, is_wanted, new_upload, selects
 from common.errors import NotFoundError, PreconditionError
+from common.jittered_backoff import JitteredBackoff
 from common.reasons import Reason
 from console.client import results
 from console.client.errors import Refused

@@ -11,8 +11,6 @@ from enum import Enum
 from typing import Final
 
 _MOST_BYTES: Final = 1024
-_INPUT_FLAGS: Final = 0
-"""Their place in what `tcgetattr` returns."""
 # Arrows, function keys and Alt with a letter send letters and digits that are not keys of their own
 # (ECMA-48 5.4: a control sequence is ESC [, parameters 0x30-0x3F, intermediates 0x20-0x2F, final 0x40-0x7E).
 _SEQUENCE: Final = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]?|O.?|.)?", re.DOTALL)
@@ -53,7 +51,7 @@ class Keyboard:
         tty.setcbreak(self.fileno, termios.TCSANOW)
         mode = termios.tcgetattr(self.fileno)
         # Ctrl-S is beside keys that drive, and holds up the program at its next output, and so every key.
-        mode[_INPUT_FLAGS] &= ~termios.IXON
+        mode[tty.IFLAG] &= ~termios.IXON
         termios.tcsetattr(self.fileno, termios.TCSANOW, mode)
 
     def give_back(self) -> None:

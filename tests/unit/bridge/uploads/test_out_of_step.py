@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from bridge.jittered_backoff import JitteredBackoff
 from bridge.uploads import uploads
 from bridge.uploads.queue import LONGEST_PAUSE_S, State
+from common.jittered_backoff import JitteredBackoff
 from fleet.errors import HubError, HubReason
 from tests.support.eventually import eventually
 from tests.support.uploading import Robot, running_uploads

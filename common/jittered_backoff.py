@@ -1,4 +1,4 @@
-"""Pauses between attempts of a robot that is one of many: exponential backoff with jitter."""
+"""Pauses between attempts of a program that is one of many: exponential backoff with equal jitter."""
 
 import asyncio
 import random
