@@ -79,40 +79,24 @@ def _rows(full: _Kind, plain: _Kind, bare: _Kind) -> list[Row]:
     )
     found = []
     for name, what, kind in variants:
-        against = f"{what}, against a bare publisher of the same messages with the NATS library alone"
-        cpu, mib = kind.cpu_percent, kind.mib
-        found += [
-            Row(
-                name=f"fleet.bridge{name}_cpu",
-                what=f"CPU of {what}",
-                unit="% of a core",
-                values=cpu,
-                bar=BAR_CPU_PERCENT,
-            ),
-            Row(
-                name=f"fleet.bridge{name}_mib",
-                what=f"resident memory of {what}",
-                unit="MiB",
-                values=mib,
-                bar=BAR_MIB,
-            ),
-            Row(
-                name=f"fleet.bridge{name}_cpu_against_bare",
-                what=f"CPU of {against}",
-                unit="% of a core",
-                values=cpu,
-                references=bare.cpu_percent,
-                bar=None,
-            ),
-            Row(
-                name=f"fleet.bridge{name}_mib_against_bare",
-                what=f"resident memory of {against}",
-                unit="MiB",
-                values=mib,
-                references=bare.mib,
-                bar=None,
-            ),
-        ]
+        measures = (
+            ("cpu", "CPU", "% of a core", kind.cpu_percent, bare.cpu_percent, BAR_CPU_PERCENT),
+            ("mib", "resident memory", "MiB", kind.mib, bare.mib, BAR_MIB),
+        )
+        for suffix, measure, unit, values, references, bar in measures:
+            row = f"fleet.bridge{name}_{suffix}"
+            of = f"{measure} of {what}"
+            found += [
+                Row(name=row, what=of, unit=unit, values=values, bar=bar),
+                Row(
+                    name=f"{row}_against_bare",
+                    what=f"{of}, against a bare publisher of the same messages with the NATS library alone",
+                    unit=unit,
+                    values=values,
+                    references=references,
+                    bar=None,
+                ),
+            ]
     return found
 
 
