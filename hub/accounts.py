@@ -38,12 +38,12 @@ _KEYS: Final[dict[KeyName, KeyKind]] = {
     "system": KeyKind.ACCOUNT,
 }
 _ACCOUNTS: Final[tuple[permissions.AccountName, ...]] = (
-    "system",
     "fleet",
     "receivers",
     "robots",
     "people",
     "commanders",
+    "system",
 )
 """In the order in which servers get them: those that export come first."""
 CONNECTIONS: Final[dict[permissions.AccountName, int]] = {

@@ -32,11 +32,13 @@ _OF_PEOPLE: Final = (
     # As above.
     *(Service(f"$JS.API.STREAM.INFO.{stream}", local=names.info_subject(stream)) for stream in _READ),
 )
+_ALL_OTHERS: Final[tuple[AccountName, ...]] = ("fleet", "receivers", "robots", "people", "commanders")
 IMPORTS: Final[Mapping[AccountName, Mapping[AccountName, tuple[Service, ...]]]] = {
     "robots": {"fleet": _OF_ROBOTS, "receivers": (_UPLOADS,)},
     "people": {"fleet": _OF_PEOPLE, "receivers": (_READING,)},
     "commanders": {"fleet": (*_OF_PEOPLE, Service(names.COMMAND_SUBJECTS)), "receivers": (_READING,)},
     "receivers": {"fleet": (Service(f"$KV.{names.RECORDINGS}.*.*"),)},
+    "system": {each: (Service(f"hub.loaded.{each}"),) for each in _ALL_OTHERS},
 }
 """What each account may request of which other one.
 
@@ -47,6 +49,11 @@ stream (measured with 2.15.1). In these accounts no one takes that subject, nor 
 
 None imports what makes a consumer: that delivers in the account of the streams, to a subject that its maker
 says. People who may not send commands are in an account that does not import them.
+
+No program serves or requests what the system account imports. A server loads that account, and with it those
+it imports from, before it listens. Any other account it would load when the first client comes; if another
+server of the cluster announces a subscription of the account in the same millisecond, the account can stay
+marked as expired, and that server refuses all its clients until it gets a newer token (nats-server 2.15).
 """
 
 

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Iterator
-from contextlib import aclosing
+from contextlib import aclosing, closing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,6 +13,7 @@ from fleet import names
 from fleet.connection import FleetAddress, Hub, Published, Start, connect
 from fleet.errors import HubError, HubReason
 from hub import streams
+from hub.accounts import account_keys
 from tests.support.eventually import eventually
 from tests.support.hub_patience import in_the_end
 from tests.support.nats_servers import NatsServers, nats_servers
@@ -47,6 +48,20 @@ async def test_a_killed_leader_costs_no_event(tmp_path: Path) -> None:
             assert fleet.longest_s < _LONGEST_GAP_S
         result = await received(FleetAddress(servers.urls), robots, messages)
     assert (result.lost, result.duplicates, result.disordered) == (0, 0, 0)
+
+
+def test_each_node_has_loaded_all_accounts_before_it_is_reached(tmp_path: Path) -> None:
+    """The defect: two nodes that loaded one at the same moment left it expired, and refused its users."""
+    hub = SecureHub(tmp_path, 3)
+    keys = account_keys(hub.directory)
+    accounts = {key.public for name, key in keys.items() if name != "operator"}
+    with closing(hub.servers):
+        hub.servers.start_all()
+        for node in range(3):
+            assert accounts <= set(hub.servers.monitor(node, "accountz")["accounts"])
+            for account in accounts:
+                found = hub.servers.monitor(node, f"accountz?acc={account}")["account_detail"]
+                assert (found["expired"], found["complete"]) == (False, True)
 
 
 async def test_a_full_hub_refuses_and_loses_nothing(tmp_path: Path) -> None:
