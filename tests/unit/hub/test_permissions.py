@@ -1,5 +1,7 @@
 """The table of permissions."""
 
+from typing import get_args
+
 import pytest
 
 from fleet import names
@@ -45,8 +47,18 @@ def test_receivers_list_recordings_and_answer() -> None:
     allowed = permissions.receiver()
     assert set(allowed.publish) == _services("receivers")
     taken = {each.partition(" ")[0] for each in allowed.subscribe} - {"_INBOX.>"}
-    exported = {each.subject for row in permissions.IMPORTS.values() for each in row.get("receivers", ())}
+    users = permissions.IMPORTS.keys() - {"system"}
+    exported = {each.subject for user in users for each in permissions.IMPORTS[user].get("receivers", ())}
     assert taken == exported
+
+
+def test_the_system_account_imports_from_all_others_what_no_user_may_serve_or_request() -> None:
+    """Servers load all accounts with it."""
+    row = permissions.IMPORTS["system"]
+    assert {"system", *row} == set(get_args(permissions.AccountName))
+    assert all(each.subject.startswith("hub.loaded.") for services in row.values() for each in services)
+    for allowed in (permissions.robot("r1"), permissions.operator(commands=True), permissions.receiver()):
+        assert not any(each.startswith(("hub.", ">")) for each in (*allowed.publish, *allowed.subscribe))
 
 
 def _services(account: permissions.AccountName) -> set[str]:
