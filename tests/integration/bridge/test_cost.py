@@ -30,8 +30,8 @@ _CORES = 0.01
 _BARE = "bare"
 """The robot that the bare publisher speaks for."""
 _BARE_CORES = 0.0014
-"""What the bare publisher takes of a core that is fast to wake up: 0.0013 to 0.0016 in four rounds, and 0.0010
-to 0.0012 where other programs keep the core awake."""
+"""What the bare publisher takes of a core that is fast to wake up: 0.0013 to 0.0016 in four rounds, and
+0.0010 to 0.0012 where other programs keep the core awake."""
 _SLOW = 1.25
 """By which it takes more where the machine is slow to wake up."""
 _PAYLOAD_BYTES = 256

@@ -37,6 +37,9 @@ PATIENCE_S = 25.0
 RTT_MS = 40.0
 KEY_FRAME_MS = 60.0
 """Beyond a round trip, a picture is torn for no longer."""
+UNDER_WAY_MS = 10.0
+"""From the capture of a frame to the moment that the receiver hands it over, on a machine that does nothing
+else, without the network: 9.3 to 9.9 ms in the middle of two rounds."""
 TIMES = 9
 APART = 15
 """Frames."""
@@ -196,6 +199,10 @@ def test_a_picture_is_torn_for_a_round_trip_and_a_key_frame(
 
     The request takes half of the round trip, and the key frame the other half. One packet is lost each time,
     so that no key frame is hit.
+
+    A machine that is slow to wake programs up delays each frame, and the key frame as much: by how much later
+    than UNDER_WAY_MS the frames of the same minute come, in the middle, that is taken off. With two programs
+    that keep both processors busy it is 13 ms, and a picture is torn for 102 ms instead of 90.
     """
     # Between two frames the encoder is asked at any moment.
     waits_s = cycle(number / 300 for number in range(1, 10))
@@ -211,13 +218,20 @@ def test_a_picture_is_torn_for_a_round_trip_and_a_key_frame(
         judge = Judge(sent)
         seen = judge.shown
         lost_s: list[float] = []
+        ages_ms: list[float] = []
         request = robot.worker.request_key_frame
 
         def requested(newest_pts: int | None) -> bool:
             lost_s.append(time.monotonic())
             return request(newest_pts)
 
+        def note_age(frame: Frame) -> None:
+            stamped_s = capture_time(frame)
+            if stamped_s is not None:
+                ages_ms.append((frame.arrival_s - stamped_s) * 1000)
+
         robot.session._on_picture_lost = requested
+        robot.session.add_frame_listener(note_age)
         robot.session.add_frame_listener(judge.note)
         wait_until(lambda: len(seen) > FRAMES, "frames", PATIENCE_S)
         wait_until(lambda: request(None), "the robot takes requests", PATIENCE_S)
@@ -234,9 +248,11 @@ def test_a_picture_is_torn_for_a_round_trip_and_a_key_frame(
             return (next(each.arrival_s for each in seen if each.arrival_s > at_s) - at_s) * 1000
 
         def torn_ms() -> float:
+            ages_ms.clear()
             found = sorted(once_torn_ms() for _ in range(TIMES))
-            print(", ".join(f"{one:.0f}" for one in found), "ms")
-            return found[-2]
+            late_ms = max(0.0, statistics.median(ages_ms) - RTT_MS / 2 - UNDER_WAY_MS)
+            print(", ".join(f"{one:.0f}" for one in found), f"ms; frames come {late_ms:.1f} ms late")
+            return found[-2] - late_ms
 
         keeps(
             RTT_MS + KEY_FRAME_MS, "ms from a lost packet to the next whole frame", torn_ms, per_stalled_s=MS
