@@ -67,6 +67,6 @@ def test_rows_without_a_figure_are_named() -> None:
 def test_figures_that_were_measured_in_another_way_are_remarked_until_they_are_measured_anew() -> None:
     older = OLDER[0]
     before = replace(ON, commit=min(older.commits))
-    both = [Run(before, (row(name="ros.flat"), row(name="status.tls"))), Run(ON, (row(name="idle.cpu"),))]
-    assert f"- `ros.*`: at commit {before.commit} {older.text}" in page(both).splitlines()
-    assert older.text not in page([Run(ON, (row(name="ros.flat"),)), Run(before, (row(name="status.tls"),))])
+    both = [Run(before, (row(name="drive.cpu"), row(name="status.tls"))), Run(ON, (row(name="idle.cpu"),))]
+    assert f"- `drive.*`: at commit {before.commit} {older.text}" in page(both).splitlines()
+    assert older.text not in page([Run(ON, (row(name="drive.cpu"),)), Run(before, (row(name="status.tls"),))])
