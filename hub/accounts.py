@@ -37,15 +37,8 @@ _KEYS: Final[dict[KeyName, KeyKind]] = {
     "receivers": KeyKind.ACCOUNT,
     "system": KeyKind.ACCOUNT,
 }
-_ACCOUNTS: Final[tuple[permissions.AccountName, ...]] = (
-    "fleet",
-    "receivers",
-    "robots",
-    "people",
-    "commanders",
-    "system",
-)
-"""In the order in which servers get them: those that export come first."""
+_ACCOUNTS: Final[tuple[permissions.AccountName, ...]] = (*permissions.OTHERS, "system")
+"""In the order in which servers get them: that of the system imports from all others."""
 CONNECTIONS: Final[dict[permissions.AccountName, int]] = {
     "robots": 3072,
     "people": 256,

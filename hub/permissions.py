@@ -32,13 +32,14 @@ _OF_PEOPLE: Final = (
     # As above.
     *(Service(f"$JS.API.STREAM.INFO.{stream}", local=names.info_subject(stream)) for stream in _READ),
 )
-_ALL_OTHERS: Final[tuple[AccountName, ...]] = ("fleet", "receivers", "robots", "people", "commanders")
+OTHERS: Final[tuple[AccountName, ...]] = ("fleet", "receivers", "robots", "people", "commanders")
+"""All accounts but the system's; those that export come first."""
 IMPORTS: Final[Mapping[AccountName, Mapping[AccountName, tuple[Service, ...]]]] = {
     "robots": {"fleet": _OF_ROBOTS, "receivers": (_UPLOADS,)},
     "people": {"fleet": _OF_PEOPLE, "receivers": (_READING,)},
     "commanders": {"fleet": (*_OF_PEOPLE, Service(names.COMMAND_SUBJECTS)), "receivers": (_READING,)},
     "receivers": {"fleet": (Service(f"$KV.{names.RECORDINGS}.*.*"),)},
-    "system": {each: (Service(f"hub.loaded.{each}"),) for each in _ALL_OTHERS},
+    "system": {each: (Service(f"hub.loaded.{each}"),) for each in OTHERS},
 }
 """What each account may request of which other one.
 
