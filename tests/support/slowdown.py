@@ -35,16 +35,27 @@ class Slowdown:
         return statistics.fmean(self._taken_s) / min(self._taken_s)
 
     def at_full_speed(self, counted: float, promised: float) -> float:
-        """Returns a counted time, or share, as that of a processor which nothing slows down.
+        """As the function, by `factor` and MOST."""
+        return at_full_speed(counted, promised, self.factor, MOST)
 
-        Raises:
-            DisturbedError: divided by MOST it is more than was promised, on a processor slowed down further.
-        """
-        figure = counted / min(self.factor, MOST)
-        if figure > promised and self.factor > MOST:
-            slowed_down = f"by a processor slowed down {self.factor:.2f} times"
-            raise DisturbedError(f"{counted:.4f} was counted, {slowed_down}")
-        return figure
+
+def at_full_speed(counted: float, promised: float, factor: float, most: float) -> float:
+    """Returns a counted time, or share, as that of a processor which nothing slows down.
+
+    Args:
+        counted: the figure.
+        promised: the documented one.
+        factor: how much longer the processor takes than it can.
+        most: by which the figure is divided at most.
+
+    Raises:
+        DisturbedError: divided by `most` it is more than was promised, on a processor slowed down further.
+    """
+    figure = counted / min(factor, most)
+    if figure > promised and factor > most:
+        slowed_down = f"by a processor slowed down {factor:.2f} times"
+        raise DisturbedError(f"{counted:.4f} was counted, {slowed_down}")
+    return figure
 
 
 def _work_s() -> float:

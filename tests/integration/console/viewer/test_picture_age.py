@@ -40,6 +40,8 @@ KEY_FRAME_MS = 60.0
 UNDER_WAY_MS = 10.0
 """From the capture of a frame to the moment that the receiver hands it over, on a machine that does nothing
 else, without the network: 9.3 to 9.9 ms in the middle of two rounds."""
+MOST_LATE_MS = 25.0
+"""What is taken off at most: twice what two busy programs cost. Without a bound, a slow viewer would pass."""
 TIMES = 9
 APART = 15
 """Frames."""
@@ -201,8 +203,9 @@ def test_a_picture_is_torn_for_a_round_trip_and_a_key_frame(
     so that no key frame is hit.
 
     A machine that is slow to wake programs up delays each frame, and the key frame as much: by how much later
-    than UNDER_WAY_MS the frames of the same minute come, in the middle, that is taken off. With two programs
-    that keep both processors busy it is 13 ms, and a picture is torn for 102 ms instead of 90.
+    than UNDER_WAY_MS the frames of the same minute come, in the middle, that is taken off, up to
+    MOST_LATE_MS. With two programs that keep both processors busy it is 13 ms, and a picture is torn for
+    102 ms instead of 90.
     """
     # Between two frames the encoder is asked at any moment.
     waits_s = cycle(number / 300 for number in range(1, 10))
@@ -250,9 +253,9 @@ def test_a_picture_is_torn_for_a_round_trip_and_a_key_frame(
         def torn_ms() -> float:
             ages_ms.clear()
             found = sorted(once_torn_ms() for _ in range(TIMES))
-            late_ms = max(0.0, statistics.median(ages_ms) - RTT_MS / 2 - UNDER_WAY_MS)
+            late_ms = statistics.median(ages_ms) - RTT_MS / 2 - UNDER_WAY_MS
             print(", ".join(f"{one:.0f}" for one in found), f"ms; frames come {late_ms:.1f} ms late")
-            return found[-2] - late_ms
+            return found[-2] - min(max(late_ms, 0.0), MOST_LATE_MS)
 
         keeps(
             RTT_MS + KEY_FRAME_MS, "ms from a lost packet to the next whole frame", torn_ms, per_stalled_s=MS
