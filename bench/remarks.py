@@ -23,8 +23,8 @@ REMARKS: Final[Mapping[tuple[str, ...], str]] = {
         " floods, with the priority of the caller that is measured."
     ),
     ("status.tls",): (
-        "each call is decrypted, its token checked and its answer encrypted: about a quarter of what a call"
-        " takes without. The rounds differ by more than that is from the bar."
+        "each call is decrypted, its token checked and its answer encrypted: a call takes"
+        " about a third longer than without. The rounds differ by more than that is from the bar."
     ),
     ("export.throughput", "export.status_p99_unlimited"): (
         "the gateway reads each file and computes a CRC-32C of each chunk, where the reference sends what it"
