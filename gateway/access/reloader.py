@@ -23,16 +23,18 @@ from gateway.status.access import AccessView, CertificateExpiry, UnreadFile
 
 _log = logging.getLogger(__name__)
 
-POLL_INTERVAL_S: Final = 0.5
-"""Bounds how long a revoked credential remains usable."""
+POLL_INTERVAL_S: Final = 0.25
+"""Bounds how long a revoked credential remains usable. Its caller learns of it half a second later
+(`REFUSAL_DELAY_S`), and all of that is promised within a second."""
 _UNKNOWN_INTERVAL_S: Final = 0.1
 """Minimum interval of polls caused by unknown credentials, of which there may be a flood."""
 UNKNOWN_WITHIN_S: Final = 2.0
 """How long a caller with an unknown credential waits for a poll."""
 CLOSED_AFTER_S: Final = 60.0
 """How long the list of credentials may be unreadable before none is accepted."""
-_FAILURES_REPORTED: Final = 3
-"""Consecutive failures before a fault: two files that belong together do not change at the same instant."""
+FAILURES_REPORTED: Final = 6
+"""Consecutive failures before a fault, 1.5 s: two files that belong together do not change at the same
+instant."""
 _DISK_HANGS: Final = UnreadFile(
     "the list of credentials can't be read: the disk does not answer",
     "Check the disk of the list; to see its errors, type: sudo dmesg",
@@ -247,7 +249,7 @@ class CredentialReloader:
     def _note(self, unread: UnreadFile) -> None:
         self._failures += 1
         # One that has been reported is outdated by whatever is found now.
-        if self._failures >= _FAILURES_REPORTED or self._unread:
+        if self._failures >= FAILURES_REPORTED or self._unread:
             self._report(unread)
 
     def _report(self, unread: UnreadFile) -> None:
