@@ -180,8 +180,11 @@ class Guard:
         with heartbeats:
             watch = Watch.started(time.monotonic_ns())
             failure = self._follow(heartbeats, watch, worker.pid)
-        # First the kill, then the zeros: a worker that thaws must not have the last word.
         if failure:
+            if watch.leased:
+                # A guard that can't publish ends here, and leaves the zeros to the worker, which may be late.
+                self._velocities.publish(ZERO)
+            # First the kill, then the zeros: a worker that thaws must not have the last word.
             worker.kill()
             self._kills += 1
         if watch.leased:

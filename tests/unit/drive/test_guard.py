@@ -14,6 +14,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 
 from drive.guard import Guard
@@ -50,6 +51,8 @@ for number in range(1_000_000):
     matched = int(os.path.exists(started + ".matched"))
     state = pb.ActualState(phase=phase, episode=episode, matched=matched, lock_left=then == "lock")
     beats.send(b"\\xff\\xff" if then == "garbage" else state.SerializeToString())
+    if then == "freeze" and number == 30:
+        os.kill(os.getpid(), signal.SIGSTOP)
     if then == "listen":
         try:
             word = beats.recv(1, socket.MSG_DONTWAIT)
@@ -231,6 +234,26 @@ def test_a_worker_that_can_never_be_started_ends_the_guard(tmp_path: Path) -> No
     stop_file = StopFile(tmp_path / "stop.json")
     with pytest.raises(FileNotFoundError):
         Guard([str(tmp_path / "none")], Zeros(), OnLoss.HOLD, stop_file, Stops()).run()
+    stop_file.close()
+
+
+def test_a_guard_that_cant_publish_kills_no_worker_that_could(tmp_path: Path) -> None:
+    """The worker's own zeros are the last then: it finds that the guard has gone."""
+
+    class Broken(Zeros):
+        def publish(self, velocity: Velocity) -> None:
+            assert velocity == ZERO
+            raise RuntimeError("publisher's context is invalid")
+
+    started, stop_file = tmp_path / "started", StopFile(tmp_path / "stop.json")
+    command = [sys.executable, "-c", BEATS, str(started), "freeze"]
+    with pytest.raises(RuntimeError, match="context is invalid"):
+        Guard(command, Broken(), OnLoss.HOLD, stop_file, Stops()).run()
+    worker = psutil.Process(int(started.read_text()))
+    try:
+        assert worker.status() == psutil.STATUS_STOPPED
+    finally:
+        worker.kill()
     stop_file.close()
 
 
