@@ -56,6 +56,8 @@ class OtherSources:
         self._ours = {*outputs, mux_output}
         self._inputs: dict[str, _Input] = {}
         self._found: dict[str, str] = {}
+        self._guessed = True
+        """Whether a node without a known output counted as the multiplexer when they were found."""
         self._looked_ns = self._taken_ns = 0
         self._commanding: tuple[str, ...] = ()
 
@@ -70,7 +72,11 @@ class OtherSources:
         return now_ns - max(self._began_ns, foreign_motion_ns) >= DISCOVERY_NS
 
     def commanding(self, now_ns: int) -> tuple[str, ...]:
-        """Returns the topics on which motion was commanded lately."""
+        """Returns the topics on which motion was commanded lately.
+
+        None while there has not been time enough to discover which node is the multiplexer: an observer may
+        be all that is known so far, and takes more than the multiplexer does.
+        """
         if now_ns - self._looked_ns >= _LOOK_EVERY_NS:
             self._looked_ns = now_ns
             self._look()
@@ -78,15 +84,19 @@ class OtherSources:
             self._taken_ns = now_ns
             self._follow(now_ns)
             # All are asked, so that each takes what has arrived.
-            self._commanding = tuple([topic for topic, each in self._inputs.items() if each.commands(now_ns)])
+            heard = [topic for topic, each in self._inputs.items() if each.commands(now_ns)]
+            early = self._guessed and now_ns - self._began_ns < DISCOVERY_NS
+            self._commanding = () if early else tuple(topic for topic in heard if topic in self._found)
         return self._commanding
 
     def _look(self) -> None:
+        self._guessed = False
         try:
             found = dict(self._other_inputs())
         except (RuntimeError, UnicodeError) as error:
             # A node that has just gone, or a name that is no text.
             _log.debug("the inputs of the multiplexer can't be listed: %s", error)
+            self._guessed = True
             return
         if found:  # A multiplexer that is started again has the inputs that it had.
             self._found = found
@@ -106,7 +116,10 @@ class OtherSources:
         """
         takers = _nodes(self._node.get_subscriptions_info_by_topic(output))
         publishing = self._node.get_publishers_info_by_topic(self._mux_output) if self._mux_output else ()
-        return takers & _nodes(publishing) or takers
+        multiplexers = takers & _nodes(publishing)
+        if not multiplexers:
+            self._guessed = True
+        return multiplexers or takers
 
     def _follow(self, now_ns: int) -> None:
         """Adds one input that is missing, or removes one: each takes the middleware a few milliseconds."""

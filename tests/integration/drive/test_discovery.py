@@ -1,0 +1,74 @@
+"""Which topics are named as other sources of commands, while the graph is being discovered."""
+
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any, Final
+
+import pytest
+
+from drive.other_sources import OtherSources
+from drive.values import DISCOVERY_NS, MS
+
+pytestmark = pytest.mark.ros
+
+OUTPUT, MUX_OUTPUT = "/cmd_vel_gateway", "/cmd_vel"
+TYPE: Final = "geometry_msgs/msg/TwistStamped"
+RECORDER, MUX = "rosbag2_recorder", "twist_mux"
+INPUTS = {RECORDER: [OUTPUT, "/wheels/velocity"], MUX: [OUTPUT, "/cmd_vel_keyboard"]}
+
+
+@dataclass
+class Graph:
+    """As far as a node shows it; a recorder that takes everything is discovered first."""
+
+    nodes: set[str] = field(default_factory=lambda: {RECORDER})
+
+    def get_subscriptions_info_by_topic(self, topic: str) -> list[Any]:
+        return [endpoint(name) for name in self.nodes if topic in INPUTS[name]]
+
+    def get_publishers_info_by_topic(self, topic: str) -> list[Any]:
+        return [endpoint(name) for name in self.nodes if (name, topic) == (MUX, MUX_OUTPUT)]
+
+    def get_subscriber_names_and_types_by_node(self, name: str, _namespace: str) -> list[Any]:
+        return [(topic, [TYPE]) for topic in INPUTS[name]]
+
+    def destroy_subscription(self, _subscription: Any) -> None:
+        pass
+
+
+def endpoint(name: str) -> Any:
+    return SimpleNamespace(node_name=name, node_namespace="/")
+
+
+@pytest.fixture
+def graph(monkeypatch: pytest.MonkeyPatch) -> Graph:
+    """Its messages are none: what is new counts as motion for a while."""
+    monkeypatch.setattr("drive.other_sources.subscribe", lambda *_: None)
+    monkeypatch.setattr("drive.other_sources.newest", lambda _: None)
+    monkeypatch.setattr("drive.other_sources.time.monotonic_ns", lambda: 0)
+    return Graph()
+
+
+def named(sources: OtherSources, until_ns: int, since_ns: int = 500 * MS) -> set[str]:
+    """What is named, asked every 100 ms."""
+    return {topic for now_ns in range(since_ns, until_ns, 100 * MS) for topic in sources.commanding(now_ns)}
+
+
+def test_what_an_observer_takes_is_not_named_while_the_multiplexer_is_discovered(graph: Graph) -> None:
+    sources = OtherSources(graph, [OUTPUT], MUX_OUTPUT)
+    assert named(sources, 1_500 * MS) == set()
+    graph.nodes.add(MUX)
+    assert named(sources, DISCOVERY_NS + 2_000 * MS, 1_500 * MS) == {"/cmd_vel_keyboard"}
+
+
+def test_where_no_multiplexer_is_discovered_all_that_take_velocities_count(graph: Graph) -> None:
+    sources = OtherSources(graph, [OUTPUT], MUX_OUTPUT)
+    assert named(sources, DISCOVERY_NS) == set()
+    assert not sources.known(DISCOVERY_NS - 1, 0)
+    sources = OtherSources(graph, [OUTPUT], MUX_OUTPUT)
+    assert named(sources, DISCOVERY_NS + 900 * MS, DISCOVERY_NS) == {"/wheels/velocity"}
+
+
+def test_a_multiplexer_that_is_known_is_believed_at_once(graph: Graph) -> None:
+    graph.nodes.add(MUX)
+    assert named(OtherSources(graph, [OUTPUT], MUX_OUTPUT), 900 * MS) == {"/cmd_vel_keyboard"}
