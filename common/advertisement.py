@@ -47,7 +47,7 @@ def advertisement_from(properties: Mapping[bytes, bytes | None]) -> Advertisemen
     def text(key: bytes) -> str:
         return _cut(properties.get(key) or b"")
 
-    return Advertisement(text(b"name"), text(b"contract"), text(b"tls") == "1")
+    return Advertisement(text(b"name"), text(b"contract"), properties.get(b"tls") == b"1")
 
 
 def _cut(value: bytes) -> str:

@@ -1,6 +1,6 @@
 """What an advertisement says, and what is read from one that is damaged or hostile."""
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from common.advertisement import Advertisement, advertisement_from
@@ -26,6 +26,7 @@ def test_each_string_fits_a_txt_record() -> None:
         st.sampled_from([b"name", b"contract", b"tls", b"x"]), st.none() | st.binary(max_size=500)
     )
 )
+@example({b"tls": b"1\x80"})
 def test_anything_can_be_read_and_is_bounded(properties: dict[bytes, bytes | None]) -> None:
     read = advertisement_from(properties)
     assert max(len(read.name), len(read.contract)) <= 200
