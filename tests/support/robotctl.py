@@ -53,12 +53,27 @@ def robotctl_in_time(*words: str, **extra: str) -> "subprocess.CompletedProcess[
     with (
         _alone(),
         mock.patch.object(sys, "argv", [str(ROBOTCTL), *words]),
-        mock.patch.dict(os.environ, environment(**extra), clear=True),
+        _environment(environment(**extra)),
         redirect_stdout(out),
         redirect_stderr(err),
     ):
         code = exit_code()
     return subprocess.CompletedProcess([ROBOTCTL, *words], code, _text(out), _text(err))
+
+
+@contextmanager
+def _environment(variables: dict[str, str]) -> Iterator[None]:
+    """Replaces `os.environ`, and leaves the environment that C code reads as it is.
+
+    setenv(3) moves the table while gRPC's threads read it (c-ares asks for LOCALDOMAIN for each name it
+    resolves): replacing all variables for every call crashed one call in 5000.
+    """
+    with (
+        mock.patch.object(os, "putenv"),
+        mock.patch.object(os, "unsetenv"),
+        mock.patch.dict(os.environ, variables, clear=True),
+    ):
+        yield
 
 
 @contextmanager
