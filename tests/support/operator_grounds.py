@@ -64,7 +64,7 @@ class RealGround(Ground):
             await asyncio.to_thread(viewer.wait_for_frames, 5)
             yield
             await asyncio.to_thread(viewer.wait_for_frames, 5)
-            assert viewer.reconnects == 0
+            assert viewer.lost == []
 
     def kill_preview(self) -> None:
         self._preview.process.kill()

@@ -27,8 +27,8 @@ class Watcher:
     ) -> None:
         self.arrivals_s: list[float] = []
         self.codecs: list[str] = []
-        self.reconnects = 0
-        """How often it had to connect again."""
+        self.lost: list[str] = []
+        """Why it had to connect again, each time."""
         self._options = ReceiverOptions(max_age_s=max_age_s)
         self._address = StreamAddress("127.0.0.1", port, latency_ms=latency_ms, passphrase=passphrase)
         self._backoff = Backoff(first_s=0.1, longest_s=2.0)
@@ -63,7 +63,8 @@ class Watcher:
                 if error.final:
                     raise
                 self._closing.wait(self._backoff.next_s())
-                self.reconnects += not self._closing.is_set()
+                if not self._closing.is_set():
+                    self.lost.append(str(error))
 
     def _take_frames(self, receiver: Receiver) -> None:
         while not self._closing.is_set():

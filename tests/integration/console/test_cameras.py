@@ -65,7 +65,7 @@ def test_switching_cameras_from_a_terminal(ground: VideoGround) -> None:
         assert code == 0
         assert "preview is running, low-bw, camera front" in out
         viewer.wait_for_frames(5)
-        assert viewer.reconnects == 0
+        assert viewer.lost == []
     status = json.loads(robotctl("--target", ground.target, "--json", "status").stdout)["preview"]
     assert status["wanted_camera"] == "front"
     assert [(each["name"], each["state"]) for each in status["cameras"]] == [
