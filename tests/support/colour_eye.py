@@ -47,12 +47,12 @@ class Eye:
 
     Attributes:
         seen: each frame that came.
-        reconnects: how often it had to connect again.
+        lost: why it had to connect again, each time.
     """
 
     def __init__(self, port: int) -> None:
         self.seen: list[Seen] = []
-        self.reconnects = 0
+        self.lost: list[str] = []
         self._address = StreamAddress("127.0.0.1", port, latency_ms=20)
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="eye")
@@ -89,8 +89,8 @@ class Eye:
             try:
                 with Receiver(self._address, queue_size=30, options=_PATIENT) as receiver:
                     self._take(receiver)
-            except StreamError:
-                self.reconnects += 1
+            except StreamError as error:
+                self.lost.append(str(error))
                 self._over.wait(_RETRY_S)
 
     def _take(self, receiver: Receiver) -> None:

@@ -53,7 +53,7 @@ def robotctl_in_time(*words: str, **extra: str) -> "subprocess.CompletedProcess[
     with (
         _alone(),
         mock.patch.object(sys, "argv", [str(ROBOTCTL), *words]),
-        _environment(environment(**extra)),
+        _only_for_python(environment(**extra)),
         redirect_stdout(out),
         redirect_stderr(err),
     ):
@@ -62,7 +62,7 @@ def robotctl_in_time(*words: str, **extra: str) -> "subprocess.CompletedProcess[
 
 
 @contextmanager
-def _environment(variables: dict[str, str]) -> Iterator[None]:
+def _only_for_python(variables: dict[str, str]) -> Iterator[None]:
     """Replaces `os.environ`, and leaves the environment that C code reads as it is.
 
     setenv(3) moves the table while gRPC's threads read it (c-ares asks for LOCALDOMAIN for each name it

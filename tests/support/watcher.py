@@ -62,8 +62,7 @@ class Watcher:
             except StreamError as error:
                 if error.final:
                     raise
-                self._closing.wait(self._backoff.next_s())
-                if not self._closing.is_set():
+                if not self._closing.wait(self._backoff.next_s()):
                     self.lost.append(str(error))
 
     def _take_frames(self, receiver: Receiver) -> None:
