@@ -1,7 +1,6 @@
 """The product as on a robot: gateway and preview service, beside a simulated robot in its own ROS domain."""
 
 import json
-import os
 import subprocess
 import sys
 import time
@@ -10,10 +9,10 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
+from bench.ros_domain import ros_domain
 from console.client import Credentials, GatewayClient, Unreachable
-from tests.support.free import free_domain, free_tcp_port, free_udp_port
+from tests.support.free import free_tcp_port, free_udp_port
 from tests.support.ros import simulated_robot
 
 UP_WITHIN_S = 30.0
@@ -53,9 +52,7 @@ def product(
     preview_settings = {"socket": socket, "source": {"kind": "test"}, "srt": {"port": free_udp_port()}}
     gateway_settings = {"grpc": {"port": tcp}, "preview": {"socket": socket}, **(gateway or {})}
     with ExitStack() as stack:
-        domain = stack.enter_context(free_domain())
-        ros = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-        stack.enter_context(patch.dict(os.environ, ros))
+        stack.enter_context(ros_domain())
         stack.enter_context(simulated_robot(directory))
         service = stack.enter_context(serving("robot-preview", directory, preview_settings))
         server = stack.enter_context(serving("robot-gateway", directory, gateway_settings))

@@ -6,17 +6,14 @@ callbacks only keep the newest message, which a timer converts as often as our s
 own threads need for each message is part of all figures, and logged.
 """
 
-import os
 import statistics
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 from bench import ros_gateway
 from bench.processes import CpuShare, cpu_share, program, resident_mib
 from bench.progress import log
+from bench.ros_domain import ros_domain
 from bench.ros_latency import latencies_ms
 from bench.rows import Row
-from tests.support.free import free_domain
 
 FAST_HZ, SLOW_HZ = 200, 50
 ROUNDS = 5
@@ -41,7 +38,7 @@ def _cpu_rows() -> list[Row]:
     newest: list[CpuShare] = []
     slow: list[CpuShare] = []
     for _ in range(ROUNDS):
-        with _domain():
+        with ros_domain():
             with program("bench.ros_talker", str(FAST_HZ)):
                 ours.append(_cpu_of("sampler", FAST_HZ))
                 stock.append(_cpu_of("callbacks", FAST_HZ))
@@ -96,7 +93,7 @@ def _cpu_of(way: str, rate_hz: int) -> CpuShare:
 
 
 def _gateway_row() -> Row:
-    with _domain():
+    with ros_domain():
         percents = ros_gateway.cpu_percents()
     return Row(
         name="ros.gateway_cpu",
@@ -111,7 +108,7 @@ def _gateway_row() -> Row:
 
 
 def _latency_row() -> Row:
-    with _domain():
+    with ros_domain():
         rounds_ms = latencies_ms()
     found = sorted(one for round_ms in rounds_ms for one in round_ms)
     log(f"ros: {len(found)} values, median {statistics.median(found):.1f} ms, longest {found[-1]:.1f} ms")
@@ -122,15 +119,3 @@ def _latency_row() -> Row:
         values=[statistics.quantiles(round_ms, n=100)[98] for round_ms in rounds_ms],
         bar=60.0,
     )
-
-
-@contextmanager
-def _domain() -> Iterator[None]:
-    before = os.environ.copy()
-    with free_domain() as domain:
-        os.environ |= {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-        try:
-            yield
-        finally:
-            os.environ.clear()
-            os.environ.update(before)

@@ -2,16 +2,15 @@
 
 import asyncio
 import json
-import os
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
-from unittest.mock import patch
 
 from bench.processes import program
+from bench.ros_domain import ros_domain
 from tests.support.driven_robot import (
     DrivenRobot,
     available,
@@ -19,7 +18,7 @@ from tests.support.driven_robot import (
     gateway_for,
     network_settings,
 )
-from tests.support.free import free_domain, free_tcp_port
+from tests.support.free import free_tcp_port
 from tests.support.heard import Base
 from tests.support.running_drive import RunningDrive
 from tests.support.tcp_link import TcpLink
@@ -58,10 +57,8 @@ class Ground:
 @contextmanager
 def driven_ground(directory: Path) -> Iterator[Ground]:
     """In a ROS domain of its own."""
-    with free_domain() as domain:
-        ros = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-        with patch.dict(os.environ, ros), driven_base(directory) as (base, drive):
-            yield Ground(directory, base, drive)
+    with ros_domain(), driven_base(directory) as (base, drive):
+        yield Ground(directory, base, drive)
 
 
 def link(robot: DrivenRobot, loss: float = 0.0, seed: int = 1) -> TcpLink:

@@ -1,19 +1,17 @@
 """A robot with a recording that can be copied: robot-recorder and robot-gateway, as processes."""
 
 import asyncio
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
-from unittest.mock import patch
 
 from bench.export.copying import METHOD, Stream
+from bench.ros_domain import ros_domain
 from console.client import GatewayClient, Recording
 from omniseer.gateway.v1 import recording_pb2 as pb
 from recorder.requests import StartOptions
-from tests.support.free import free_domain
 from tests.support.gateway_program import GatewayProgram, gateway_program
 from tests.support.recorder_in_process import Source, running_recorder
 from tests.support.running_recorder import RecorderProgram, recorder_program
@@ -65,17 +63,15 @@ def exporting_robot(directory: Path, size: int = SIZE) -> Iterator[ExportingRobo
     """Yields a robot whose recording has about that many bytes, which do not compress."""
     recorder = RecorderProgram(directory, {})
     asyncio.run(_record(recorder.root, size))
-    with free_domain() as domain:
-        ros = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-        with (
-            patch.dict(os.environ, ros),
-            recorder_program(directory) as running,
-            gateway_program(directory, sources=[], recording={"socket": str(running.socket)}) as gateway,
-            GatewayClient(f"127.0.0.1:{gateway.port}") as client,
-        ):
-            wait_until(lambda: gateway.status().recording.recordings, "the gateway knows the recording")
-            (listed,) = client.recordings()
-            yield ExportingRobot(directory, running, gateway, client.recording(listed.id))
+    with (
+        ros_domain(),
+        recorder_program(directory) as running,
+        gateway_program(directory, sources=[], recording={"socket": str(running.socket)}) as gateway,
+        GatewayClient(f"127.0.0.1:{gateway.port}") as client,
+    ):
+        wait_until(lambda: gateway.status().recording.recordings, "the gateway knows the recording")
+        (listed,) = client.recordings()
+        yield ExportingRobot(directory, running, gateway, client.recording(listed.id))
 
 
 async def _record(root: Path, size: int) -> None:

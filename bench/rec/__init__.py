@@ -8,7 +8,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from bench.catalogue import rows_of
-from bench.rec.ground import ros_domain
+from bench.ros_domain import ros_domain
 from bench.rows import Row
 
 

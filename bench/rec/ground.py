@@ -1,7 +1,6 @@
 """What the benchmarks of recording share: a ROS domain, a publisher, and a recording."""
 
 import json
-import os
 import subprocess
 import uuid
 from collections.abc import Iterator, Mapping
@@ -9,11 +8,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
-from unittest.mock import patch
 
 from bench.processes import program
 from omniseer.gateway.v1 import recording_pb2 as pb
-from tests.support.free import free_domain
 from tests.support.running_recorder import RecorderProgram
 from tests.support.waiting import wait_until
 
@@ -22,15 +19,6 @@ PRESET: Final = {"all": {"topics": ["/bench/*"]}}
 _WITHIN_S: Final = 60.0
 _FIRST_MESSAGES: Final = 1000
 """Written by then: all topics are subscribed, with queues that fit their rates (some 1.5 s of messages)."""
-
-
-@contextmanager
-def ros_domain() -> Iterator[None]:
-    """Gives the block a ROS domain of its own, which the programs that it starts inherit."""
-    with free_domain() as domain:
-        ros = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-        with patch.dict(os.environ, ros):
-            yield
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Final
 
 from bench.progress import log
-from bench.rec.ground import PRESET, begun, ros_domain, talker
+from bench.rec.ground import PRESET, begun, talker
 from bench.rec.reading import newest_ns
+from bench.ros_domain import ros_domain
 from bench.rows import FEWEST_ROUNDS, Row
 from tests.support.running_recorder import recorder_program
 

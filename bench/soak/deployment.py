@@ -1,16 +1,15 @@
 """A whole robot in one ROS domain, with all of its programs, and its fleet's hub."""
 
 import asyncio
-import os
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
-from unittest.mock import patch
 
 from bench.product import serving
+from bench.ros_domain import ros_domain
 from bench.soak.readings import Reading
 from common.ros_transport import VARIABLE
 from console.client import CloudState, GatewayClient, Unreachable
@@ -18,7 +17,7 @@ from console.client.results import RecorderState
 from console.receiver.address import StreamAddress
 from simrobot.control import ask
 from tests.support.driven_robot import TELEOP, driven_base
-from tests.support.free import free_domain, free_tcp_port, free_udp_port
+from tests.support.free import free_tcp_port, free_udp_port
 from tests.support.heard import Base
 from tests.support.nats_servers import NatsServers, nats_servers
 from tests.support.ros_camera import ros_camera
@@ -102,13 +101,7 @@ def deployment() -> Iterator[Deployment]:
     """Runs all programs until the block ends; each serves when it begins."""
     with ExitStack() as stack:
         directory = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        domain = stack.enter_context(free_domain())
-        environment = {
-            "ROS_DOMAIN_ID": str(domain),
-            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-            VARIABLE: "udp",  # as the containers have it
-        }
-        stack.enter_context(patch.dict(os.environ, environment))
+        stack.enter_context(ros_domain(**{VARIABLE: "udp"}))  # as the containers have it
         base, drive = stack.enter_context(driven_base(directory))
         arm = ArmCamera()
         stack.callback(arm.stop)

@@ -5,7 +5,6 @@ in it included, and of the preview; for shared memory that of the preview alone.
 footage, encoder and profile. The camera's node and the writer of the shared memory are not counted.
 """
 
-import os
 import subprocess
 import sys
 import tempfile
@@ -16,10 +15,10 @@ from typing import Any, Final
 
 from bench.processes import cpu_share
 from bench.progress import log
+from bench.ros_domain import ros_domain
 from bench.rows import FEWEST_ROUNDS, Row
 from bench.video import foreign
 from bench.video.camera import camera
-from tests.support.free import free_domain
 from tests.support.running_preview import RunningPreview
 from tests.support.running_tap import RunningTap
 
@@ -40,9 +39,9 @@ def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
     with camera(workdir, FPS) as source:
         description = {"kind": "gst", "description": source.source}
         for _ in range(ROUNDS):
-            with _directory() as directory, _ros_domain():
+            with _directory() as directory, ros_domain():
                 shared.append(_preview_share(directory, {"source": description})[0])
-            with _directory() as directory, _ros_domain(), _publishing(workdir / "footage.nv12"):
+            with _directory() as directory, ros_domain(), _publishing(workdir / "footage.nv12"):
                 with RunningTap(directory) as tap:
                     settings = {
                         "source": {"kind": "ros", "topic": TOPIC, "fps": FPS},
@@ -84,22 +83,6 @@ def _preview_share(
 def _directory() -> Iterator[Path]:
     with tempfile.TemporaryDirectory() as directory:
         yield Path(directory)
-
-
-@contextmanager
-def _ros_domain() -> Iterator[None]:
-    """A domain of its own, in force for child processes."""
-    with free_domain() as domain:
-        own = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-        before = {name: os.environ.get(name) for name in own}
-        os.environ.update(own)
-        try:
-            yield
-        finally:
-            for name, value in before.items():
-                os.environ.pop(name)
-                if value is not None:
-                    os.environ[name] = value
 
 
 @contextmanager

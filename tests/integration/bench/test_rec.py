@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from bench.rec import cpu, killing, losing, recovering, snapshots
-from bench.rec.ground import PRESET, ros_domain, talker
+from bench.rec.ground import PRESET, talker
 from bench.rec.reading import gaps, missing
+from bench.ros_domain import ros_domain
 from tests.support.running_recorder import RecorderProgram, recorder_program
 
 pytestmark = pytest.mark.ros

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 
 from bench.rec import video
-from bench.rec.ground import ros_domain
+from bench.ros_domain import ros_domain
 
 pytestmark = [pytest.mark.ros, pytest.mark.gst]
 
