@@ -1,10 +1,12 @@
 """Groups network addresses by the part that a sender can't choose, for limits per address."""
 
 import ipaddress
+from functools import lru_cache
 from typing import Final
 
 _IPV6_PREFIX_BITS: Final = 64
 """A host chooses the remaining 64 bits freely (interface identifier, RFC 4291 2.5.1)."""
+_REMEMBERED: Final = 1024
 
 
 def host_of(address: str) -> str:
@@ -12,6 +14,7 @@ def host_of(address: str) -> str:
     return address.rpartition(":")[0].strip("[]")
 
 
+@lru_cache(maxsize=_REMEMBERED)  # a crowd comes from few hosts
 def address_prefix(host: str) -> str:
     """Returns an IPv4 address as it is, the /64 prefix of an IPv6 address, and any other text unchanged."""
     try:

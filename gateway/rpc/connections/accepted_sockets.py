@@ -7,7 +7,8 @@ import os
 import socket
 import stat
 import struct
-from contextlib import ExitStack, suppress
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
@@ -109,14 +110,24 @@ class AcceptedSockets:
         """
         program = packet_filter.program_of(policy)
         try:
-            for descriptor in self._listening:
-                with _duplicate(descriptor) as listening:
-                    if not _listens(listening):
-                        continue  # the number belongs to another socket by now
-                    packet_filter.attach(listening, program)
+            with self.listening() as listening:
+                for each in listening:
+                    packet_filter.attach(each, program)
         except OSError:
             return False
         return bool(self._listening)
+
+    @contextmanager
+    def listening(self) -> Iterator[list[socket.socket]]:
+        """Yields duplicates of the sockets that accept the connections, as far as `scan` has found them.
+
+        Raises:
+            OSError: one was closed meanwhile, or no descriptor is left.
+        """
+        with ExitStack() as stack:
+            duplicates = [stack.enter_context(_duplicate(each)) for each in self._listening]
+            # A number may belong to another socket by now.
+            yield [each for each in duplicates if _listens(each)]
 
     def received_bytes(self, address: str) -> int:
         """Returns how much this peer has sent since it connected; 0 where that is not known."""
@@ -131,13 +142,14 @@ class AcceptedSockets:
         Raises:
             OSError: it was closed meanwhile.
         """
-        ours = _duplicate(self._descriptors.get(address, _NONE))
-        with ExitStack() as stack:
-            stack.enter_context(ours)
+        ours = _duplicate_of_tcp(self._descriptors.get(address, _NONE))
+        try:
             # The number may belong to another socket by now, of any family.
-            if ours.family not in _FAMILIES or _address_of(ours) != address:
+            if _address_of(ours) != address:
                 raise ConnectionError(address)
-            stack.pop_all()
+        except OSError:
+            ours.close()
+            raise
         return ours
 
     def _peer_address(self, descriptor: int) -> str:
@@ -154,13 +166,25 @@ def _duplicate(descriptor: int) -> socket.socket:
     return socket.socket(fileno=os.dup(descriptor))
 
 
+def _duplicate_of_tcp(descriptor: int) -> socket.socket:
+    """As `_duplicate`, of what is a TCP socket: Python makes two system calls less to find out what it is."""
+    return socket.socket(socket.AF_INET6, socket.SOCK_STREAM, socket.IPPROTO_TCP, fileno=os.dup(descriptor))
+
+
 def _listens(ours: socket.socket) -> bool:
     return bool(ours.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN))
 
 
 def _address_of(connected: socket.socket) -> str:
-    """Returns the peer's address as gRPC spells it, by which it is found among those that make calls."""
-    host, port, *ipv6 = connected.getpeername()
+    """Returns the peer's address as gRPC spells it, by which it is found among those that make calls.
+
+    Raises:
+        OSError: there is no peer, or it is none of TCP's; `_duplicate_of_tcp` does not find out.
+    """
+    peer = connected.getpeername()
+    if not isinstance(peer, tuple):
+        raise ConnectionError(f"{peer!r} is no peer of TCP")  # but the path of a Unix socket
+    host, port, *ipv6 = peer
     if not ipv6:
         return f"{host}:{port}"
     if "." in host:

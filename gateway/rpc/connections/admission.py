@@ -295,6 +295,11 @@ class Admission:
         """Whether strangers connect faster than the gateway can take, or did so a moment ago."""
         return self._shedding.active
 
+    @property
+    def rushed(self) -> bool:
+        """Whether strangers are connecting so fast right now."""
+        return self._shedding.rushed
+
     def connect_policy(self) -> ConnectPolicy:
         """Returns from whom further connections are to be accepted now. Called after `surplus`."""
         blocked, one_in = self._blocklist.blocked(), self._shedding.one_in

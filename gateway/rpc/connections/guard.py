@@ -10,12 +10,18 @@ from typing import Final, NoReturn
 
 from gateway.rpc.connections.accepted_sockets import UNLIMITED, AcceptedSockets
 from gateway.rpc.connections.admission import Admission
+from gateway.rpc.connections.arrivals import next_arrival
 from gateway.rpc.connections.packet_filter import ConnectPolicy
 
 _log = logging.getLogger(__name__)
 
 SCAN_EVERY_S: Final = 0.1
 """What is accepted in between is bounded by the server's limit of connections."""
+SCAN_AGAIN_S: Final = 0.02
+"""Instead of SCAN_EVERY_S when a caller connects, and amid a rush: a connection that is found late has cost
+its TLS handshake, and a flood hundreds of calls, before those of operators."""
+_REST_FACTOR: Final = 4
+"""A look is followed by so many times its duration without one."""
 PENDING_BYTES: Final = 1_048_576
 """What a pending connection may send: a few of the largest requests, or thousands of small ones."""
 OVERRUN_BYTES: Final = 16_384
@@ -51,7 +57,7 @@ _FRESH: Final = _Watched()
 
 
 class ConnectionGuard:
-    """Looks at the connections that there are, ten times a second.
+    """Looks at the connections that there are: ten times a second, and sooner when callers connect.
 
     Args:
         admission: knows which must go.
@@ -82,22 +88,33 @@ class ConnectionGuard:
         """Guards the operators' port until cancelled."""
         sockets = AcceptedSockets(port)
         while True:
-            await asyncio.sleep(SCAN_EVERY_S)
-            done = self.closed + self.throttled + self.muted
+            done, began_s = self.closed + self.throttled + self.muted, self._clock()
             try:
                 self.look(sockets)
+                if self.closed + self.throttled + self.muted > done:
+                    self._report()
+                await self._rest(sockets, self._clock() - began_s)
             except OSError as error:
                 # No descriptors are left; the server's limit keeps connections from being the cause.
                 self._log(logging.ERROR, f"connections can't be examined: {error}")
-                continue
-            if self.closed + self.throttled + self.muted > done:
-                self._log(
-                    logging.WARNING,
-                    f"of connections without an admitted call, {self.closed} were closed since the start, "
-                    f"{self.throttled} were throttled and {self.muted} muted because they sent too much; "
-                    f"{self.open} are open, {len(self.policy.blocked)} addresses blocked, and 1 in "
-                    f"{self.policy.one_in} of the attempts of other strangers to connect is accepted",
-                )
+                await asyncio.sleep(SCAN_EVERY_S)
+
+    async def _rest(self, sockets: AcceptedSockets, looked_s: float) -> None:
+        """Returns when it is time for the next look.
+
+        Args:
+            sockets: the connections.
+            looked_s: how long the last look took.
+
+        Raises:
+            OSError: no descriptor is left.
+        """
+        rest_s = min(SCAN_EVERY_S, max(SCAN_AGAIN_S, looked_s * _REST_FACTOR))
+        if not self._admission.rushed:
+            with sockets.listening() as listening:
+                await next_arrival(listening, SCAN_EVERY_S - rest_s)
+        # After an arrival, too: until then gRPC has accepted the connection, and whatever comes with it.
+        await asyncio.sleep(rest_s)
 
     def look(self, sockets: AcceptedSockets) -> None:
         """Looks at all connections once.
@@ -180,6 +197,15 @@ class ConnectionGuard:
             self.muted += 1
         elif sockets.close(address):
             self.closed += 1
+
+    def _report(self) -> None:
+        self._log(
+            logging.WARNING,
+            f"of connections without an admitted call, {self.closed} were closed since the start, "
+            f"{self.throttled} were throttled and {self.muted} muted because they sent too much; "
+            f"{self.open} are open, {len(self.policy.blocked)} addresses blocked, and 1 in "
+            f"{self.policy.one_in} of the attempts of other strangers to connect is accepted",
+        )
 
     def _log(self, level: int, message: str) -> None:
         """Logs a message, unless there was one lately: attackers must not fill the log."""

@@ -1,5 +1,6 @@
 """Load shedding: while too many strangers connect, a share of their attempts is dropped."""
 
+import math
 import time
 from collections.abc import Callable
 from typing import Final
@@ -11,7 +12,11 @@ BURST: Final = 128
 PER_S: Final = 64.0
 """And so many a second: their TLS handshakes take less than a tenth of a core."""
 RAISE_FACTOR: Final = 8
-"""At each look at the connections that finds more."""
+"""At a look at the connections that finds more."""
+RAISE_AFTER_S: Final = 0.05
+"""Since it was raised last: what has come meanwhile may have been on its way before that."""
+RUSH_S: Final = 1.0
+"""So long a stranger is a new one."""
 LOWER_FACTOR: Final = 2
 LOWER_AFTER_S: Final = 1.0
 """Without an excess: TCP tries again one second after its first attempt (RFC 6298 2.1)."""
@@ -32,7 +37,7 @@ class Shedding:
         self._clock = clock
         self._bucket = TokenBucket(BURST, clock())
         self._exceeded = False
-        self._changed_s = clock()
+        self._changed_s = self._newest_s = -math.inf
         self.one_in = 1
 
     @property
@@ -40,15 +45,23 @@ class Shedding:
         """Whether attempts are dropped."""
         return self.one_in > 1
 
+    @property
+    def rushed(self) -> bool:
+        """Whether attempts are dropped and strangers are connecting all the same."""
+        return self.active and self._clock() - self._newest_s < RUSH_S
+
     def note_stranger(self) -> None:
         """Takes down a new connection of an address that is not trusted."""
-        if not self._bucket.take(self._clock(), capacity=BURST, refill_per_s=PER_S):
+        self._newest_s = self._clock()
+        if not self._bucket.take(self._newest_s, capacity=BURST, refill_per_s=PER_S):
             self._exceeded = True
 
     def adapt(self) -> None:
         """Raises the share that is dropped if there were too many since the last time; else lowers it."""
         now_s = self._clock()
         if self._exceeded:
+            if now_s - self._changed_s < RAISE_AFTER_S:
+                return
             self._exceeded = False
             self.one_in = min(MAX_ONE_IN, self.one_in * RAISE_FACTOR)
             self._changed_s = now_s

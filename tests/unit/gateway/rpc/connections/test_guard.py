@@ -1,11 +1,13 @@
 """Which connections the guard throttles, and which it cuts off: pending ones that have sent too much."""
 
+import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
 
+from common.tasks import cancel
 from gateway.config import LimitSettings
 from gateway.rpc.calls.call import Peer, peer_of
 from gateway.rpc.connections.accepted_sockets import UNLIMITED
@@ -21,6 +23,7 @@ from gateway.rpc.connections.guard import (
 from gateway.rpc.connections.packet_filter import ConnectPolicy
 from gateway.rpc.connections.shedding import BURST, RAISE_FACTOR
 from tests.support.clock import Clock
+from tests.support.eventually import eventually
 
 STRANGER, OPERATOR = "10.0.0.1:1000", "10.0.0.2:1000"
 NEIGHBOUR = "10.0.0.2:2000"
@@ -230,3 +233,43 @@ def test_a_caller_whose_calls_flood_is_muted_and_others_at_its_address_are_not_b
     ground.look()
     assert ground.sockets.muted == [OPERATOR]
     assert ground.guard.policy.blocked == frozenset()
+
+
+def seen_by(guard: ConnectionGuard) -> Callable[[], Awaitable[int]]:
+    async def seen() -> int:
+        return guard.open
+
+    return seen
+
+
+async def test_a_connection_is_looked_at_as_it_comes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not at the next of the looks that come anyway, of which there is none here."""
+    monkeypatch.setattr("gateway.rpc.connections.guard.SCAN_EVERY_S", 3600.0)
+    guard = ConnectionGuard(Admission(LimitSettings()))
+    async with await asyncio.start_server(lambda *_: None, "127.0.0.1", 0) as server:
+        port = server.sockets[0].getsockname()[1]
+        guarding = asyncio.create_task(guard.run(port))
+        try:
+            await asyncio.sleep(0)  # the first look finds none
+            _, writer = await asyncio.open_connection("127.0.0.1", port)
+            await eventually(seen_by(guard), bool, "the connection is seen")
+            writer.close()
+        finally:
+            await cancel([guarding])
+
+
+async def test_amid_a_rush_it_looks_without_being_called(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What strangers send, and where shedding has to end, no arrival shows."""
+    monkeypatch.setattr("gateway.rpc.connections.guard.SCAN_EVERY_S", 3600.0)
+    admission = Admission(LimitSettings())
+    admission.surplus([f"10.1.{number}.1:1" for number in range(2 * BURST)])
+    assert admission.rushed
+    guard = ConnectionGuard(admission)
+    looks: asyncio.Queue[None] = asyncio.Queue()
+    monkeypatch.setattr(guard, "look", lambda _sockets: looks.put_nowait(None))
+    guarding = asyncio.create_task(guard.run(1))
+    try:
+        for _ in range(3):
+            await looks.get()
+    finally:
+        await cancel([guarding])
