@@ -21,7 +21,7 @@ SCAN_AGAIN_S: Final = 0.02
 """Instead of SCAN_EVERY_S when a caller connects, and amid a rush: a connection that is found late has cost
 its TLS handshake, and a flood hundreds of calls, before those of operators."""
 _REST_FACTOR: Final = 4
-"""A look is followed by so many times its duration without one."""
+"""A look is followed by so many times its CPU time without one."""
 PENDING_BYTES: Final = 1_048_576
 """What a pending connection may send: a few of the largest requests, or thousands of small ones."""
 OVERRUN_BYTES: Final = 16_384
@@ -88,12 +88,12 @@ class ConnectionGuard:
         """Guards the operators' port until cancelled."""
         sockets = AcceptedSockets(port)
         while True:
-            done, began_s = self.closed + self.throttled + self.muted, self._clock()
+            done, began_s = self.closed + self.throttled + self.muted, time.thread_time()
             try:
                 self.look(sockets)
                 if self.closed + self.throttled + self.muted > done:
                     self._report()
-                await self._rest(sockets, self._clock() - began_s)
+                await self._rest(sockets, time.thread_time() - began_s)
             except OSError as error:
                 # No descriptors are left; the server's limit keeps connections from being the cause.
                 self._log(logging.ERROR, f"connections can't be examined: {error}")
@@ -104,7 +104,8 @@ class ConnectionGuard:
 
         Args:
             sockets: the connections.
-            looked_s: how long the last look took.
+            looked_s: CPU time of the last look: one that took long because attackers keep the processor must
+                not have the next one wait for longer.
 
         Raises:
             OSError: no descriptor is left.
