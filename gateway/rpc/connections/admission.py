@@ -29,6 +29,8 @@ PENDING_S: Final = 10.0
 """How long a connection may be pending: a TLS handshake and a call over a bad link."""
 MAX_PENDING: Final = 128
 """Pending connections, or a quarter of those that are accepted, and half of them from one address."""
+NEWCOMER_S: Final = 0.3
+"""So long a pending connection is a new one: if it floods, it mostly does so within this time."""
 SPARED_S: Final = 1.0
 """So long many of one address may be pending, as where all operators come back after a restart, if there is
 room for all."""
@@ -295,10 +297,12 @@ class Admission:
         """Whether strangers connect faster than the gateway can take, or did so a moment ago."""
         return self._shedding.active
 
-    @property
-    def rushed(self) -> bool:
-        """Whether strangers are connecting so fast right now."""
-        return self._shedding.rushed
+    def has_newcomers(self) -> bool:
+        """Returns whether a connection is pending that was not a moment ago."""
+        since_s = self._clock() - NEWCOMER_S
+        return any(
+            not each.admitted and each.pending_since_s > since_s for each in self._connections.values()
+        )
 
     def connect_policy(self) -> ConnectPolicy:
         """Returns from whom further connections are to be accepted now. Called after `surplus`."""

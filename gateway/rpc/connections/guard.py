@@ -18,8 +18,8 @@ _log = logging.getLogger(__name__)
 SCAN_EVERY_S: Final = 0.1
 """What is accepted in between is bounded by the server's limit of connections."""
 SCAN_AGAIN_S: Final = 0.02
-"""Instead of SCAN_EVERY_S when a caller connects, and amid a rush: a connection that is found late has cost
-its TLS handshake, and a flood hundreds of calls, before those of operators."""
+"""Instead of SCAN_EVERY_S when a caller connects, and while there are newcomers: one that is found late has
+cost its TLS handshake, and a flood thousands of calls, before those of operators."""
 _REST_FACTOR: Final = 4
 """A look is followed by so many times its CPU time without one."""
 PENDING_BYTES: Final = 1_048_576
@@ -111,7 +111,7 @@ class ConnectionGuard:
             OSError: no descriptor is left.
         """
         rest_s = min(SCAN_EVERY_S, max(SCAN_AGAIN_S, looked_s * _REST_FACTOR))
-        if not self._admission.rushed:
+        if not self._admission.has_newcomers():
             with sockets.listening() as listening:
                 await next_arrival(listening, SCAN_EVERY_S - rest_s)
         # After an arrival, too: until then gRPC has accepted the connection, and whatever comes with it.

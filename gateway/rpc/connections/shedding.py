@@ -15,8 +15,6 @@ RAISE_FACTOR: Final = 8
 """At a look at the connections that finds more."""
 RAISE_AFTER_S: Final = 0.05
 """Since it was raised last: what has come meanwhile may have been on its way before that."""
-RUSH_S: Final = 1.0
-"""So long a stranger is a new one."""
 LOWER_FACTOR: Final = 2
 LOWER_AFTER_S: Final = 1.0
 """Without an excess: TCP tries again one second after its first attempt (RFC 6298 2.1)."""
@@ -37,7 +35,7 @@ class Shedding:
         self._clock = clock
         self._bucket = TokenBucket(BURST, clock())
         self._exceeded = False
-        self._changed_s = self._newest_s = -math.inf
+        self._changed_s = -math.inf
         self.one_in = 1
 
     @property
@@ -45,15 +43,9 @@ class Shedding:
         """Whether attempts are dropped."""
         return self.one_in > 1
 
-    @property
-    def rushed(self) -> bool:
-        """Whether attempts are dropped and strangers are connecting all the same."""
-        return self.active and self._clock() - self._newest_s < RUSH_S
-
     def note_stranger(self) -> None:
         """Takes down a new connection of an address that is not trusted."""
-        self._newest_s = self._clock()
-        if not self._bucket.take(self._newest_s, capacity=BURST, refill_per_s=PER_S):
+        if not self._bucket.take(self._clock(), capacity=BURST, refill_per_s=PER_S):
             self._exceeded = True
 
     def adapt(self) -> None:

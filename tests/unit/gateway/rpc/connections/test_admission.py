@@ -9,6 +9,7 @@ from gateway.rpc.calls.call import peer_of
 from gateway.rpc.calls.methods import SERVICES
 from gateway.rpc.connections.admission import (
     METHOD_RATES,
+    NEWCOMER_S,
     PENDING_S,
     PENDING_STREAMS,
     QUIET_AFTER_S,
@@ -54,6 +55,22 @@ def test_a_pending_connection_has_a_while(admission: Admission, clock: Clock) ->
     assert admission.surplus(["10.0.0.5:1"]) == []
     clock.now_s += 0.1
     assert admission.surplus(["10.0.0.5:1"]) == ["10.0.0.5:1"]
+
+
+def test_who_came_a_moment_ago_without_an_admitted_call_is_a_newcomer(
+    admission: Admission, clock: Clock
+) -> None:
+    seen = [admission.has_newcomers()]
+    admission.surplus(["10.0.0.5:1"])
+    seen.append(admission.has_newcomers())
+    clock.now_s += NEWCOMER_S
+    admission.surplus(["10.0.0.5:1"])
+    seen.append(admission.has_newcomers())
+    admission.surplus(["10.0.0.5:1", "10.0.0.5:2"])
+    seen.append(admission.has_newcomers())
+    admit(admission, "10.0.0.5:2")
+    seen.append(admission.has_newcomers())
+    assert seen == [False, True, False, True, False]
 
 
 def test_calls_that_are_not_admitted_win_no_time(admission: Admission, clock: Clock) -> None:

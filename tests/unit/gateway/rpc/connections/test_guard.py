@@ -258,12 +258,14 @@ async def test_a_connection_is_looked_at_as_it_comes(monkeypatch: pytest.MonkeyP
             await cancel([guarding])
 
 
-async def test_amid_a_rush_it_looks_without_being_called(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What strangers send, and where shedding has to end, no arrival shows."""
+async def test_while_there_are_newcomers_it_looks_without_being_called(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What they send, no arrival shows."""
     monkeypatch.setattr("gateway.rpc.connections.guard.SCAN_EVERY_S", 3600.0)
     admission = Admission(LimitSettings())
-    admission.surplus([f"10.1.{number}.1:1" for number in range(2 * BURST)])
-    assert admission.rushed
+    monkeypatch.setattr("gateway.rpc.connections.admission.NEWCOMER_S", 3600.0)
+    admission.surplus([STRANGER])
     guard = ConnectionGuard(admission)
     looks: asyncio.Queue[None] = asyncio.Queue()
     monkeypatch.setattr(guard, "look", lambda _sockets: looks.put_nowait(None))

@@ -12,7 +12,6 @@ from gateway.rpc.connections.shedding import (
     PER_S,
     RAISE_AFTER_S,
     RAISE_FACTOR,
-    RUSH_S,
     Shedding,
 )
 from tests.support.clock import Clock
@@ -64,16 +63,6 @@ def test_looks_in_quick_succession_raise_it_no_faster(shedding: Shedding, clock:
     assert arrive(shedding, 100) == RAISE_FACTOR
     clock.now_s += RAISE_AFTER_S
     assert arrive(shedding, 0) == RAISE_FACTOR**2, "they were too many all the same"
-
-
-def test_a_rush_lasts_as_long_as_strangers_come(shedding: Shedding, clock: Clock) -> None:
-    seen = []
-    for count, after_s in ((BURST, 0.0), (1, 0.0), (0, RUSH_S), (1, 0.0)):
-        clock.now_s += after_s
-        arrive(shedding, count)
-        seen.append(shedding.rushed)
-    assert seen == [False, True, False, True]
-    assert shedding.active, "all the time but the first"
 
 
 def test_it_falls_slowly_until_all_are_accepted_again(shedding: Shedding, clock: Clock) -> None:
