@@ -42,7 +42,8 @@ class AcceptedSockets:
         self._addresses: dict[int, str] = {}
         """By inode, which is the socket's own as long as it lives; empty for those that are none of ours."""
         self._descriptors: dict[str, int] = {}
-        self._listening: list[int] = []
+        self._listening: dict[int, int] = {}
+        """Descriptors by inode: those of `listening` are others of the same sockets."""
 
     def scan(self) -> list[str]:
         """Returns the addresses of the peers, as `Peer.address` spells them.
@@ -52,7 +53,7 @@ class AcceptedSockets:
         """
         with os.scandir(_DESCRIPTORS) as entries:
             descriptors = [int(each.name) for each in entries]
-        known, self._addresses, self._descriptors, self._listening = self._addresses, {}, {}, []
+        known, self._addresses, self._descriptors, self._listening = self._addresses, {}, {}, {}
         for descriptor in descriptors:
             # Any descriptor may be closed meanwhile, that of this listing certainly is.
             with suppress(OSError):
@@ -64,7 +65,7 @@ class AcceptedSockets:
                     address = self._peer_address(descriptor)
                 self._addresses[status.st_ino] = address
                 if address == _LISTENS:
-                    self._listening.append(descriptor)
+                    self._listening[status.st_ino] = descriptor
                 elif address:
                     self._descriptors[address] = descriptor
         return list(self._descriptors)
@@ -125,7 +126,7 @@ class AcceptedSockets:
             OSError: one was closed meanwhile, or no descriptor is left.
         """
         with ExitStack() as stack:
-            duplicates = [stack.enter_context(_duplicate(each)) for each in self._listening]
+            duplicates = [stack.enter_context(_duplicate(each)) for each in self._listening.values()]
             # A number may belong to another socket by now.
             yield [each for each in duplicates if _listens(each)]
 

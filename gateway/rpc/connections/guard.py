@@ -10,7 +10,7 @@ from typing import Final, NoReturn
 
 from gateway.rpc.connections.accepted_sockets import UNLIMITED, AcceptedSockets
 from gateway.rpc.connections.admission import Admission
-from gateway.rpc.connections.arrivals import next_arrival
+from gateway.rpc.connections.arrivals import Arrivals
 from gateway.rpc.connections.packet_filter import ConnectPolicy
 
 _log = logging.getLogger(__name__)
@@ -88,34 +88,31 @@ class ConnectionGuard:
         """Guards the operators' port until cancelled."""
         sockets = AcceptedSockets(port)
         while True:
-            done, began_s = self.closed + self.throttled + self.muted, time.thread_time()
             try:
-                self.look(sockets)
-                if self.closed + self.throttled + self.muted > done:
-                    self._report()
-                await self._rest(sockets, time.thread_time() - began_s)
+                sockets.scan()
+                with sockets.listening() as listening, Arrivals(listening) as arrivals:
+                    await self._keep_looking(sockets, arrivals)
             except OSError as error:
                 # No descriptors are left; the server's limit keeps connections from being the cause.
                 self._log(logging.ERROR, f"connections can't be examined: {error}")
                 await asyncio.sleep(SCAN_EVERY_S)
 
-    async def _rest(self, sockets: AcceptedSockets, looked_s: float) -> None:
-        """Returns when it is time for the next look.
-
-        Args:
-            sockets: the connections.
-            looked_s: CPU time of the last look: one that took long because attackers keep the processor must
-                not have the next one wait for longer.
+    async def _keep_looking(self, sockets: AcceptedSockets, arrivals: Arrivals) -> NoReturn:
+        """Looks until cancelled.
 
         Raises:
-            OSError: no descriptor is left.
+            OSError: the connections can't be listed.
         """
-        rest_s = min(SCAN_EVERY_S, max(SCAN_AGAIN_S, looked_s * _REST_FACTOR))
-        if not self._admission.has_newcomers():
-            with sockets.listening() as listening:
-                await next_arrival(listening, SCAN_EVERY_S - rest_s)
-        # After an arrival, too: until then gRPC has accepted the connection, and whatever comes with it.
-        await asyncio.sleep(rest_s)
+        while True:
+            done, began_s = self.closed + self.throttled + self.muted, time.thread_time()
+            self.look(sockets)
+            if self.closed + self.throttled + self.muted > done:
+                self._report()
+            # Not by the clock: a look that the attackers' load draws out must not put the next one off.
+            rest_s = min(SCAN_EVERY_S, max(SCAN_AGAIN_S, (time.thread_time() - began_s) * _REST_FACTOR))
+            if self._admission.has_newcomers() or await arrivals.next(SCAN_EVERY_S):
+                # After an arrival, too: meanwhile gRPC accepts the connection, and what comes with it.
+                await asyncio.sleep(rest_s)
 
     def look(self, sockets: AcceptedSockets) -> None:
         """Looks at all connections once.
