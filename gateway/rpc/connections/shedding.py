@@ -13,7 +13,7 @@ PER_S: Final = 64.0
 """And so many a second: their TLS handshakes take less than a tenth of a core."""
 RAISE_FACTOR: Final = 8
 """At a look at the connections that finds more."""
-RAISE_AFTER_S: Final = 0.05
+RAISE_AFTER_S: Final = 0.09
 """Since it was raised last: what has come meanwhile may have been on its way before that."""
 LOWER_FACTOR: Final = 2
 LOWER_AFTER_S: Final = 1.0
