@@ -34,6 +34,9 @@ NEWCOMER_S: Final = 0.3
 SPARED_S: Final = 1.0
 """So long many of one address may be pending, as where all operators come back after a restart, if there is
 room for all."""
+NOTICE_S: Final = 1.0
+"""So long a connection of which a revocation has ended streams makes no room for others: until its caller has
+the reason. One that is cut off before takes it for an outage, and connects again."""
 PENDING_STREAMS: Final = 4
 """Of one pending connection, of which the health service is all that it can use."""
 METHOD_RATES: Final[Mapping[str, float]] = {
@@ -61,6 +64,7 @@ class _Connection:
     floods: bool = False
     unused: bool = False
     streams: int = 0
+    revoked_s: float = -math.inf
     refused_s: float = -math.inf
     excess_s: float = -math.inf
     method_buckets: dict[str, TokenBucket] = field(default_factory=dict)
@@ -214,10 +218,17 @@ class Admission:
             return self.is_pending(peer)
         return self._clock() - connection.excess_s < FORGIVEN_AFTER_S
 
-    def dismiss(self, peer: Peer) -> None:
-        """Takes the connection's place away, after a credential was invalid."""
+    def dismiss(self, peer: Peer, *, revoked: bool = False) -> None:
+        """Takes the connection's place away, after a credential was invalid.
+
+        Args:
+            peer: the other end.
+            revoked: whether that has just ended streams of it.
+        """
         connection = self._connections.get(peer.address)
-        if connection is not None:
+        if connection is not None and connection.admitted:
+            if revoked:
+                connection.revoked_s = self._clock()
             self._free_place(connection)
 
     def surplus(self, present: Iterable[str]) -> list[str]:
@@ -245,7 +256,11 @@ class Admission:
 
     def _beyond_limits(self, now_s: float) -> list[str]:
         """Returns the pending connections that are too old or too many."""
-        pending = [(each, address) for address, each in self._connections.items() if not each.admitted]
+        pending = [
+            (each, address)
+            for address, each in self._connections.items()
+            if not each.admitted and now_s - each.revoked_s > NOTICE_S
+        ]
         pending.sort(key=lambda item: item[0].pending_since_s, reverse=True)
         newer: Counter[str] = Counter()
         ranked = []

@@ -175,7 +175,7 @@ class Auth(Interceptor[CallContext]):
             # First the stream, then the place: others of the same connection may be valid.
             ended.append((call, self._streams.pop(call)))
             call.refusal = self._authenticator.access_lost()
-            self._dismiss(call)
+            self._dismiss(call, revoked=True)
         if ended:
             self._abort_later(self._abort_all(ended), name="revocation of streams")
 
@@ -191,14 +191,14 @@ class Auth(Interceptor[CallContext]):
             if number % _ABORTS_PER_TURN == 0:
                 await asyncio.sleep(0)
 
-    def _dismiss(self, call: CallContext) -> None:
+    def _dismiss(self, call: CallContext, *, revoked: bool = False) -> None:
         """Takes the connection's place away, unless a stream of a valid caller is open on it."""
         # A stranger's has none, and is not searched for: there may be thousands of such calls a second.
         if self._admission.is_pending(call.peer):
             return
         address = call.peer.address
         if not any(each.peer.address == address for each in self._streams):
-            self._admission.dismiss(call.peer)
+            self._admission.dismiss(call.peer, revoked=revoked)
 
     async def _abort(self, call: CallContext, task: "asyncio.Task[object]") -> None:
         """Aborts the call with the reason, and cancels it on our side whether or not the caller reads."""

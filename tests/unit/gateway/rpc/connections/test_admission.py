@@ -10,6 +10,7 @@ from gateway.rpc.calls.methods import SERVICES
 from gateway.rpc.connections.admission import (
     METHOD_RATES,
     NEWCOMER_S,
+    NOTICE_S,
     PENDING_S,
     PENDING_STREAMS,
     QUIET_AFTER_S,
@@ -71,6 +72,20 @@ def test_who_came_a_moment_ago_without_an_admitted_call_is_a_newcomer(
     admit(admission, "10.0.0.5:2")
     seen.append(admission.has_newcomers())
     assert seen == [False, True, False, True, False]
+
+
+def test_who_has_lost_access_is_not_cut_off_before_it_knows(admission: Admission, clock: Clock) -> None:
+    """However many strangers want the room: it has streams whose end is on its way."""
+    revoked = from_one(PER_ADDRESS)
+    for address in revoked:
+        admit(admission, address)
+    crowd = from_many(2 * PLACES)
+    admission.surplus([*revoked, *crowd])
+    for address in revoked:
+        admission.dismiss(peer_of(f"ipv4:{address}"), revoked=True)
+    assert not set(revoked).intersection(admission.surplus([*revoked, *crowd]))
+    clock.now_s += NOTICE_S + 0.1
+    assert set(revoked).intersection(admission.surplus([*revoked, *crowd]))
 
 
 def test_calls_that_are_not_admitted_win_no_time(admission: Admission, clock: Clock) -> None:
