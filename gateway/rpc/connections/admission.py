@@ -50,6 +50,8 @@ METHOD_RATES: Final[Mapping[str, float]] = {
 and the recorder's disk is everyone's. The schema documents them."""
 _REDUCED_BURST_S: Final = 0.01
 """The reduced bucket holds what is refilled in this time."""
+_RENEWED_EVERY_S: Final = 60.0
+"""How often an address is trusted anew while a connection from there has a place."""
 _RETRY_AFTER_S: Final = 1.0
 """Suggested to a caller for whom there is no connection left."""
 
@@ -91,6 +93,7 @@ class Admission:
         self._clock = clock
         self._blocklist = Blocklist(clock)
         self._shedding = Shedding(clock)
+        self._renewed_s = clock()
         self._connections: dict[str, _Connection] = {}
         """By `Peer.address`, the one that called last at the end."""
         self._places: Counter[str] = Counter()
@@ -248,11 +251,20 @@ class Admission:
             self._free_place(gone)
         for address in present - self._connections.keys():
             self._connections[address] = self._new(_prefix_of(address), now_s)
+        self._renew_trust(now_s)
         self._shedding.adapt()
         surplus = self._beyond_limits(now_s)
         for address in surplus:
             self._note_unused(self._connections[address])
         return surplus
+
+    def _renew_trust(self, now_s: float) -> None:
+        """Trusts addresses for as long as they have places, and TRUSTED_S from then on."""
+        if now_s - self._renewed_s < _RENEWED_EVERY_S:
+            return
+        self._renewed_s = now_s
+        for prefix in self._places:
+            self._blocklist.note_admitted(prefix)
 
     def _beyond_limits(self, now_s: float) -> list[str]:
         """Returns the pending connections that are too old or too many."""

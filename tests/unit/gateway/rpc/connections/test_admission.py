@@ -17,7 +17,7 @@ from gateway.rpc.connections.admission import (
     SPARED_S,
     Admission,
 )
-from gateway.rpc.connections.blocklist import UNUSED_BURST, UNUSED_IF_STRICT
+from gateway.rpc.connections.blocklist import TRUSTED_S, UNUSED_BURST, UNUSED_IF_STRICT
 from gateway.rpc.connections.packet_filter import ConnectPolicy
 from gateway.rpc.connections.shedding import BURST, LOWER_AFTER_S, RAISE_FACTOR
 from tests.support.clock import Clock
@@ -287,6 +287,27 @@ def test_connections_from_an_address_with_an_admitted_call_are_no_rush(admission
     admit(admission, "10.0.0.5:1")
     admission.surplus([f"10.0.0.5:{port}" for port in range(1, 2 * BURST)])
     assert not admission.overrun
+
+
+def test_an_address_is_trusted_for_as_long_as_it_has_a_place_and_a_while_longer(
+    admission: Admission, clock: Clock
+) -> None:
+    """A session may last for hours, on a connection whose calls need be admitted once."""
+    stranger = "10.0.0.5:2"
+    admit(admission, "10.0.0.5:1")
+    for _ in range(int(2 * TRUSTED_S / 60)):
+        clock.now_s += 60
+        admission.surplus(["10.0.0.5:1"])
+    admission.note_flood(stranger)
+    assert not admission.connect_policy().blocked
+    clock.now_s += TRUSTED_S / 2
+    admission.surplus([])
+    admission.note_flood(stranger)
+    assert not admission.connect_policy().blocked
+    clock.now_s += TRUSTED_S
+    admission.surplus([])
+    admission.note_flood(stranger)
+    assert admission.connect_policy().blocked == {"10.0.0.5"}
 
 
 def test_amid_a_rush_few_unused_connections_get_an_address_blocked(admission: Admission) -> None:
