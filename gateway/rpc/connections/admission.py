@@ -325,7 +325,7 @@ class Admission:
         return self._shedding.active
 
     def has_newcomers(self) -> bool:
-        """Returns whether a connection is pending that was not a moment ago."""
+        """Returns whether a connection has been pending for NEWCOMER_S at the most, a new one or not."""
         since_s = self._clock() - NEWCOMER_S
         return any(
             not each.admitted and each.pending_since_s > since_s for each in self._connections.values()
