@@ -312,7 +312,8 @@ class Worker:
 
     def _problems(self) -> list[str]:
         problems = self._base.problems()
-        return [*problems, self._guard_problem] if self._guard_problem else problems
+        # The first: a report has room for some text alone, and cuts what comes last.
+        return [self._guard_problem, *problems] if self._guard_problem else problems
 
     def _count(self, event: Event, before: State, after: State) -> None:
         counters = self._counters

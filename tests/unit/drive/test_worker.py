@@ -414,6 +414,16 @@ def test_nothing_moves_before_the_guard_reaches_the_base(world: World) -> None:
     ]
 
 
+def test_no_other_problem_keeps_the_guards_out_of_a_report(world: World) -> None:
+    """The defect: it came last, and what the names of a graph make longer than a report cut it off."""
+    world.guard_says.clear()
+    setattr(world, "problems", lambda: ["x" * 4096])  # noqa: B010
+    world.end(210)
+    world.worker.run()
+    problems = world.worker._actual(world.now_ns).problems
+    assert problems[0] == "the guard of robot-drive does not reach the base yet, and could not stop it"
+
+
 def test_a_report_without_a_driver_has_the_robots_own_reasons(world: World) -> None:
     world.surroundings = replace(world.surroundings, robot_stopped=True)
     world.end(210)
