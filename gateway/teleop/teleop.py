@@ -58,6 +58,17 @@ _CHECK_EVERY_S: Final = 0.05
 _PICTURE_EVERY: Final = 8
 """Checks between two reports of the pictures, of which the drive program needs two a second."""
 _SESSION_ID_BYTES: Final = 12
+_OF_NO_DRIVER: Final = frozenset({DrivePhase.DISABLED, DrivePhase.STOPPED})
+"""Phases that are the same for every driver."""
+_OF_A_DRIVER: Final = frozenset(
+    {
+        DriveInhibit.COMMAND_LATE,
+        DriveInhibit.LOOP_LATE,
+        DriveInhibit.PICTURE_MISSING,
+        DriveInhibit.PICTURE_STALE,
+    }
+)
+"""Reasons that are those of one session."""
 _NS_PER_MS: Final = 1_000_000
 
 
@@ -193,15 +204,19 @@ class Teleop:
         """Returns what a lane is sent."""
         drive, newest, now_ns = self.link.view, driving.newest, time.monotonic_ns()
         granted = self._is_granted(driving.session)
-        phase = drive.phase
+        phase, inhibits = drive.phase, _inhibits(drive)
         if phase is DrivePhase.AVAILABLE or (phase is DrivePhase.DISABLED and drive.enabled):
             # The lease is on its way to the drive program, or waits for it.
             phase = DrivePhase.ARMED if granted and drive.reachable else DrivePhase.INHIBITED
+        elif not granted or _is_of_another(drive, driving.session):
+            # Who was taken over from may have the lease there still: this driver's holds move nothing yet.
+            phase = phase if phase in _OF_NO_DRIVER else DrivePhase.INHIBITED
+            inhibits = tuple(each for each in inhibits if each not in _OF_A_DRIVER)
         return DriveFacts(
             now_ns=now_ns,
             drive=drive,
             phase=phase,
-            inhibits=_inhibits(drive),
+            inhibits=inhibits,
             newest_sequence=driving.session.sequence,
             command_age_ms=_age_ms(now_ns, driving.arrived_ns) or 0,
             loop_age_ms=(_age_ms(now_ns, newest.echo_ns) or 0) if newest else 0,
@@ -340,6 +355,12 @@ class Teleop:
         driving.later = None
         if driving.session.ended is None:
             self._pass_on(driving, driving.pacing.due(time.monotonic()))
+
+
+def _is_of_another(drive: DriveView, session: Session) -> bool:
+    """Returns whether the drive program reports the lease of another session."""
+    reported = drive.actual.session_id if drive.actual else ""
+    return reported not in {"", session.session_id}
 
 
 def _inhibits(drive: DriveView) -> tuple[DriveInhibit, ...]:
