@@ -20,7 +20,7 @@ import pytest
 from drive.guard import Guard
 from drive.machine import OnLoss
 from drive.stop_file import StopFile, Stops, read_stops
-from drive.values import ZERO, Latch, Velocity
+from drive.values import MS, ZERO, Latch, Velocity
 from tests.support.undisturbed import END, SILENT
 from tests.support.waiting import wait_until
 
@@ -103,10 +103,14 @@ class Running:
 
 @contextmanager
 def guarding(
-    tmp_path: Path, then: str, on_loss: OnLoss = OnLoss.HOLD, stops: Stops | None = None
+    tmp_path: Path,
+    then: str,
+    on_loss: OnLoss = OnLoss.HOLD,
+    stops: Stops | None = None,
+    zeros: Zeros | None = None,
 ) -> Iterator[Running]:
     path = tmp_path / "stop.json"
-    stop_file, zeros = StopFile(path), Zeros()
+    stop_file, zeros = StopFile(path), zeros or Zeros()
     started = tmp_path / "started"
     command = [sys.executable, "-c", BEATS, str(started), then]
     guard = Guard(command, zeros, on_loss, stop_file, stops or Stops())
@@ -257,14 +261,54 @@ def test_a_guard_that_cant_publish_kills_no_worker_that_could(tmp_path: Path) ->
     stop_file.close()
 
 
-def test_hand_back_ends_the_zeros(tmp_path: Path) -> None:
-    with guarding(tmp_path, "crash", OnLoss.HAND_BACK) as running:
-        lost = running.worker()
-        began_s = time.monotonic()
-        os.kill(lost, signal.SIGKILL)
-        wait_until(lambda: len(running.pids()) >= 5, "four attempts", 20)
-        zeros = running.zeros.since(began_s)
-        assert 0.3 < zeros[-1] < 0.6
+class Clock:
+    """The guard's, which stands still but where the test moves it: how busy the machine is has no effect."""
+
+    def __init__(self) -> None:
+        self.now_ns = 10**12
+        self._read = threading.local()
+
+    def monotonic_ns(self) -> int:
+        """The present instant."""
+        self._read.newest_ns = self.now_ns
+        return self.now_ns
+
+    @property
+    def newest_ns(self) -> int:
+        """The instant that this thread has read last: what it does now it does as of that."""
+        newest_ns: int = self._read.newest_ns
+        return newest_ns
+
+
+@dataclass
+class DatedZeros(Zeros):
+    """The guard's publisher; dates each zero by what the guard has read of its clock."""
+
+    clock: Clock = field(default_factory=Clock)
+    dated_ns: list[int] = field(default_factory=list)
+
+    def publish(self, velocity: Velocity) -> None:
+        super().publish(velocity)
+        self.dated_ns.append(self.clock.newest_ns)
+
+
+def test_hand_back_ends_the_zeros(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    zeros = DatedZeros()
+    clock, dated_ns = zeros.clock, zeros.dated_ns
+    monkeypatch.setattr("drive.guard.time", clock)
+    with guarding(tmp_path, "crash", OnLoss.HAND_BACK, zeros=zeros) as running:
+        os.kill(running.worker(), signal.SIGKILL)
+        lost_ns = clock.now_ns
+        wait_until(lambda: dated_ns, "the first zero")
+        last_ns = clock.now_ns = lost_ns + 500 * MS - 1
+        wait_until(lambda: dated_ns.count(last_ns) > 3, "zeros to the end of the half second")
+
+        def four_attempts() -> bool:
+            clock.now_ns += 10 * MS
+            return len(running.pids()) >= 5
+
+        wait_until(four_attempts, "four attempts", 20)
+        assert dated_ns[-1] == last_ns
     assert read_stops(running.stop_file).latch is None
 
 
