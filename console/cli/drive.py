@@ -172,7 +172,7 @@ class _Cockpit:
             # To the end of the calls: a second signal is not to end a stop that is on its way.
             with handled(dict.fromkeys(ENDING, self._end)):
                 try:
-                    async with drive_terminal.reporting_keys(keyboard, self._take_late) as hands:
+                    async with drive_terminal.reporting_keys(keyboard, self._take_meanwhile) as hands:
                         with drive_terminal.reading(keyboard, lambda typed: self._take(typed, hands)):
                             await self._drive(hands)
                 finally:
@@ -224,10 +224,12 @@ class _Cockpit:
                     self._controls.release()
         self._hold(hands)
 
-    def _take_late(self, actions: list[Action]) -> None:
-        """Takes what is typed at the end: a stop counts at any time."""
+    def _take_meanwhile(self, actions: list[Action]) -> None:
+        """Takes what is typed before driving and after it: a stop and the end count at any time."""
         if Action.STOP in actions:
             self._call(self._stop("by the driver's keyboard"))
+        if Action.QUIT in actions:
+            self._ending = True
 
     def _hold(self, hands: Hands) -> None:
         self._begun = self._begun or self._driving.is_ready

@@ -160,17 +160,24 @@ class Hands:
     Args:
         releases: Whether the terminal reports releases.
         liveness: Of the terminal, and is given its answers; None for one that never answers.
+        begun: Whether that is known; else `begin` follows.
     """
 
-    def __init__(self, *, releases: bool, liveness: Liveness | None = None) -> None:
+    def __init__(self, *, releases: bool, liveness: Liveness | None = None, begun: bool = True) -> None:
         self.releases = releases
         self._liveness = liveness
+        self._begun = begun
         self._down: dict[str, Direction] = {}
         """By the place on the keyboard: what a key means may change before it is released."""
         self._taps: dict[Direction, float] = {}
         """When each was pressed last whose release is not reported."""
         self._unfinished = ""
         self._typed_s = -math.inf
+
+    def begin(self, *, releases: bool, liveness: Liveness | None) -> None:
+        """Takes what the terminal reports, as the arguments of the class; releases all keys."""
+        self.releases, self._liveness, self._begun = releases, liveness, True
+        self.release()
 
     def take(self, typed: str, now_s: float) -> list[Action]:
         """Takes what was typed; returns what is to be done once, in order.
@@ -214,7 +221,7 @@ class Hands:
     @property
     def awaits_answer(self) -> bool:
         """Whether the terminal has yet to give a sign of life that was requested."""
-        return self._liveness is not None and self._liveness.awaited
+        return not self._begun or (self._liveness is not None and self._liveness.awaited)
 
     def ask(self, now_s: float) -> str:
         """Returns the request for a sign of life that is to be sent now; empty for none."""

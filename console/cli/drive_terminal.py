@@ -22,27 +22,26 @@ _MOST_READS: Final = 256
 
 
 @asynccontextmanager
-async def reporting_keys(
-    keyboard: Keyboard, take_late: Callable[[list[Action]], object]
-) -> AsyncIterator[Hands]:
+async def reporting_keys(keyboard: Keyboard, take: Callable[[list[Action]], object]) -> AsyncIterator[Hands]:
     """Makes the terminal report releases, where it can, and its focus, while the block lasts.
 
     Args:
         keyboard: Of the terminal.
-        take_late: Is given what is typed while an answer is awaited after the block.
+        take: Is given at once what is to be done by the keys that are typed while an answer is awaited before
+            the block, or after it.
 
     Yields:
         The hands on its keys.
     """
-    hands = Hands(releases=False)
+    hands = Hands(releases=False, begun=False)
     try:
         with ExitStack() as modes:
-            hands = await _hands(keyboard, modes)
+            await _begin(keyboard, hands, modes, take)
             _write(drive_keys.FOCUS_BEGIN)
             modes.callback(_write, drive_keys.FOCUS_END)
             yield hands
     finally:
-        take_late(await _take_last_answer(keyboard, hands))
+        await _take_last_answer(keyboard, hands, take)
 
 
 @contextmanager
@@ -61,27 +60,33 @@ def ask(request: str) -> None:
     _write(request)
 
 
-async def _hands(keyboard: Keyboard, modes: ExitStack) -> Hands:
+async def _begin(
+    keyboard: Keyboard, hands: Hands, modes: ExitStack, take: Callable[[list[Action]], object]
+) -> None:
     """Makes it report releases until the modes are left, and say that it does: some have the rest alone.
 
     Presses alone have a liveness, too, if all that was requested was answered in time.
     """
     asked_s = time.monotonic()
-    answer = await _answer(keyboard)
+    answer = await _answer(keyboard, hands, take)
     if drive_keys.flags_in(answer) is not None:
         with ExitStack() as begun:
             _write(drive_keys.RELEASES_BEGIN)
             begun.callback(_write, drive_keys.RELEASES_END)
             asked_s = time.monotonic()
-            answer = await _answer(keyboard)
+            answer = await _answer(keyboard, hands, take)
             if drive_keys.report_releases(drive_keys.flags_in(answer)):
                 modes.push(begun.pop_all())
-                return Hands(releases=True, liveness=Liveness(asked_s))
-    return Hands(releases=False, liveness=Liveness(asked_s, releases=False) if answer else None)
+                hands.begin(releases=True, liveness=Liveness(asked_s))
+                return
+    hands.begin(releases=False, liveness=Liveness(asked_s, releases=False) if answer else None)
 
 
-async def _answer(keyboard: Keyboard) -> str:
-    """Returns what the terminal answers to ASK_ALL; nothing unless all of it comes in time."""
+async def _answer(keyboard: Keyboard, hands: Hands, take: Callable[[list[Action]], object]) -> str:
+    """Returns what the terminal answers to ASK_ALL; nothing unless all of it comes in time.
+
+    What is to be done by the keys before it is passed on.
+    """
     until_s = asyncio.get_running_loop().time() + _ANSWER_WITHIN_S
     _write(drive_keys.ASK_ALL)
     answer = ""
@@ -89,25 +94,23 @@ async def _answer(keyboard: Keyboard) -> str:
         typed = await _typed(keyboard, until_s)
         if typed is None:
             return ""
+        take(hands.take(typed, time.monotonic()))
         answer += typed
         if drive_keys.is_complete(answer):
             return answer
     return ""
 
 
-async def _take_last_answer(keyboard: Keyboard, hands: Hands) -> list[Action]:
+async def _take_last_answer(keyboard: Keyboard, hands: Hands, take: Callable[[list[Action]], object]) -> None:
     """Waits for an answer that is on its way, which would be typed in the shell; not for long.
 
-    Returns:
-        What is to be done by the keys before it.
+    What is to be done by the keys before it is passed on.
     """
     until_s = asyncio.get_running_loop().time() + _ANSWER_WITHIN_S
-    actions: list[Action] = []
     for _ in range(_MOST_READS):
         if not hands.awaits_answer or (typed := await _typed(keyboard, until_s)) is None:
-            break
-        actions += hands.take(typed, time.monotonic())
-    return actions
+            return
+        take(hands.take(typed, time.monotonic()))
 
 
 async def _typed(keyboard: Keyboard, until_s: float) -> str | None:

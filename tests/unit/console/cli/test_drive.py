@@ -105,12 +105,13 @@ async def test_a_stop_goes_out_also_where_driving_ends_at_once(
     session: Any = SimpleNamespace(as_json=False, out=Console(file=io.StringIO()))
     cockpit = _Cockpit(session, robot, robot, (None, None), Controls(Input.KEYBOARD, None))
     if late:
-        cockpit._take_late([Action.QUIT, Action.RESET, Action.STOP])
+        cockpit._take_meanwhile([Action.QUIT, Action.RESET, Action.STOP])
     else:
         cockpit._take(" x", Hands(releases=False))
     await cockpit._finish_calls()
     assert robot.stops == ["by the driver's keyboard"]
     assert not robot.resets
+    assert cockpit._ending
 
 
 @asynccontextmanager

@@ -397,6 +397,17 @@ def test_requests_that_are_not_answered_end() -> None:
     assert liveness.ask(1000.0)
 
 
+def test_what_is_typed_before_the_terminal_has_answered_moves_nothing_and_is_no_part_of_it() -> None:
+    hands = Hands(releases=False, begun=False)
+    assert hands.awaits_answer
+    assert hands.take(f"w {W_DOWN}\x1b", 0.0) == [Action.STOP]
+    assert hands.take("[?62;c\x1b[32;1", 0.02) == []
+    hands.begin(releases=True, liveness=Liveness(0.0))
+    assert hands.steering(0.03) is None
+    assert hands.take(":1u", 0.04) == [Action.STOP]
+    assert not hands.awaits_answer
+
+
 def test_an_answer_may_come_in_pieces_wherever_it_is_cut() -> None:
     for at in range(1, len(ATTRIBUTES)):
         hands = watched_taps()

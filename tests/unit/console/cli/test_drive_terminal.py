@@ -11,7 +11,7 @@ from contextlib import asynccontextmanager
 import pytest
 
 from console.cli import drive_terminal
-from console.cli.drive_keys import ASK_ALL, Action
+from console.cli.drive_keys import ASK_ALL, Action, Hands
 from console.cli.keyboard import Keyboard
 from tests.support.eventually import eventually
 from tests.support.kitty import ALL_FLAGS, Kitty
@@ -37,7 +37,21 @@ class Screen:
 
 
 def ignored(actions: list[Action]) -> None:
-    """Takes what is typed at the end."""
+    """Takes what is typed while an answer is awaited."""
+
+
+class HeldUp(Kitty):
+    """A terminal whose newest answer is held up, once it has answered all that a program begins with."""
+
+    held_up = ""
+
+    def answer(self, written: str) -> str:
+        """What it answers at once; the rest is what is held up."""
+        answer = super().answer(written)
+        if self.speaks and not self.pushed:
+            return answer
+        self.held_up += answer
+        return ""
 
 
 @asynccontextmanager
@@ -182,6 +196,34 @@ async def test_space_counts_also_while_the_last_answer_is_awaited(monkeypatch: p
             drive_terminal.ask(hands.ask(time.monotonic() + 1.0))
         keyboard.give_back()
     assert late == [Action.STOP]
+
+
+@pytest.mark.parametrize("speaks", [True, False], ids=["second answer", "first answer"])
+async def test_space_and_x_count_at_once_while_the_first_answers_are_awaited(
+    monkeypatch: pytest.MonkeyPatch, speaks: bool
+) -> None:
+    """The defect: what was typed before them was dropped."""
+    kitty, taken = HeldUp(speaks=speaks), list[Action]()
+
+    async def taken_now() -> list[Action]:
+        return taken
+
+    async def drive() -> Hands:
+        keyboard = Keyboard()
+        keyboard.take()
+        async with drive_terminal.reporting_keys(keyboard, taken.extend) as hands:
+            return hands
+
+    async with screen(monkeypatch, kitty) as shown:
+        driving = asyncio.create_task(drive())
+        await has(shown, ASK_ALL, pushed=speaks)
+        shown.press("w\x1b[32;1:1u\x1b[120;1:1u" if speaks else "w x")
+        await eventually(taken_now, lambda taken: taken == [Action.STOP, Action.QUIT], "Space and x")
+        assert not driving.done(), "the answer is still awaited"
+        shown.press(kitty.held_up)
+        hands = await driving
+    assert hands.releases == speaks
+    assert hands.steering(time.monotonic()) is None, "no motion begins before"
 
 
 async def test_ctrl_s_holds_up_neither_the_program_nor_its_keys(monkeypatch: pytest.MonkeyPatch) -> None:
