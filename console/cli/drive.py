@@ -173,6 +173,7 @@ class _Cockpit:
             with handled(dict.fromkeys(ENDING, self._end)):
                 try:
                     async with drive_terminal.reporting_keys(keyboard, self._take_meanwhile) as hands:
+                        self._warn(hands)
                         with drive_terminal.reading(keyboard, lambda typed: self._take(typed, hands)):
                             await self._drive(hands)
                 finally:
@@ -267,6 +268,11 @@ class _Cockpit:
         except GatewayError as error:
             self._note = str(error)
 
+    def _warn(self, hands: Hands) -> None:
+        """Says above the line, which has no room for it, what holds as long as the robot is driven."""
+        if not self._session.as_json and (warning := self._controls.warning(hands)):
+            print(warning, file=self._session.out.file, flush=True)
+
     def _show(self, hands: Hands) -> None:
         state = self._driving.state
         if state is None:
@@ -280,7 +286,7 @@ class _Cockpit:
             return
         line = self._driving.reasons()
         if self._begun:
-            note = self._controls.problem(hands) or self._note or self._controls.advice(hands)
+            note = self._controls.problem(hands) or self._note or self._controls.advice()
             line = _line(state, self._driving, note)
         if line != self._shown:
             self._shown = line

@@ -59,16 +59,21 @@ class Controls:
             return "the terminal does not answer: a key counts when it does, and the key is pressed anew"
         return self._pad.problem() if self._pad else ""
 
-    def advice(self, keys: Hands) -> str:
-        """Returns how to drive now, and what is to be known of the keys."""
+    def warning(self, keys: Hands) -> str:
+        """Returns what is to be known of the keys before driving; empty without anything of that kind."""
+        if self._choice is Input.GAMEPAD or keys.ages_known:
+            return ""
+        return "old presses count: this terminal does not answer, so their age is not known"
+
+    def advice(self) -> str:
+        """Returns how to drive now."""
         pad = self._pad.name if self._pad else ""
         if self._choice is Input.GAMEPAD:
             return (
                 f"hold a shoulder button of {pad} to drive, B stops, x ends" if pad else "plug a gamepad in"
             )
         also = f" or a shoulder button of {pad}" if pad else ""
-        warning = "" if keys.ages_known else "old presses count: this terminal does not answer; "
-        return f"{warning}hold w a s d{also} to drive, space stops, x ends"
+        return f"hold w a s d{also} to drive, space stops, x ends"
 
 
 @contextmanager

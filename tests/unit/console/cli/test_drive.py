@@ -119,11 +119,37 @@ async def _of_taps(*_: object) -> AsyncIterator[Hands]:
     yield Hands(releases=False)
 
 
-async def run_until_a_stop(monkeypatch: pytest.MonkeyPatch, robot: Any) -> None:
-    """Drives without a terminal; Space is the last key."""
+def without_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Makes the cockpit run where no terminal is, as at one that answers nothing."""
     monkeypatch.setattr("console.cli.drive.Keyboard", MagicMock())
     monkeypatch.setattr("console.cli.drive.drive_terminal.reporting_keys", _of_taps)
     monkeypatch.setattr("console.cli.drive.drive_terminal.reading", MagicMock())
+
+
+async def test_a_terminal_of_80_columns_has_room_for_the_warning_and_for_the_keys(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The defect: the warning was the beginning of the line, which cut the keys off."""
+    without_a_terminal(monkeypatch)
+    robot, screen = Robot(), io.StringIO()
+    robot.state.phase, robot.state.stop, robot.is_ready = DrivePhase.ARMED, None, True
+    session: Any = SimpleNamespace(as_json=False, out=Console(file=screen, width=80))
+    port: Any = robot
+    cockpit = _Cockpit(session, port, port, (None, None), Controls(Input.KEYBOARD, None))
+
+    async def drive(hands: Hands) -> None:
+        cockpit._take("", hands)
+        cockpit._show(hands)
+
+    monkeypatch.setattr(cockpit, "_drive", drive)
+    await cockpit.run()
+    assert "old presses count" in screen.getvalue()
+    assert "hold w a s d to drive, space stops, x ends" in screen.getvalue()
+
+
+async def run_until_a_stop(monkeypatch: pytest.MonkeyPatch, robot: Any) -> None:
+    """Drives without a terminal; Space is the last key."""
+    without_a_terminal(monkeypatch)
     session: Any = SimpleNamespace(as_json=True)
     cockpit = _Cockpit(session, robot, robot, (None, None), Controls(Input.KEYBOARD, None))
 
