@@ -21,9 +21,13 @@ second), and short of the delay before the first."""
 ASK_EVERY_S: Final = 0.1
 """Between two requests for a sign of life."""
 ASK_AGAIN_S: Final = 2.0
-"""From a request that is not answered to the next one: its answer may be lost."""
-_MOST_REQUESTS: Final = 4
-"""That are not answered. With as many lost answers each would count for a request that is too old."""
+"""From the newest of MOST_AT_ONCE requests without an answer to the next one; twice as long to each
+further one."""
+MOST_AT_ONCE: Final = 4
+"""Requests of the last ASK_AGAIN_S that are not answered. With ASK_EVERY_S between them, enough for round
+trips of 0.4 s; after longer ones an answer is too old (KNOWN_FOR_S)."""
+MOST_REQUESTS: Final = 9
+"""That are not answered at all. A terminal that is silent for a minute is not asked before it answers."""
 KNOWN_FOR_S: Final = 0.5
 """How long a key counts after the newest request that the terminal has answered. Beyond ASK_EVERY_S and the
 round trips of most networks."""
@@ -35,8 +39,10 @@ ASK_FLAGS: Final = "\x1b[?u"
 """Requests the protocol's flags that are in force."""
 ASK_ATTRIBUTES: Final = "\x1b[c"
 """Requests what every terminal answers (DA1)."""
-ASK_ALL: Final = ASK_FLAGS + ASK_ATTRIBUTES
-"""The second, so that silence is an answer to the first."""
+ASK_STATUS: Final = "\x1b[5n"
+"""Requests what nearly every terminal answers (DSR)."""
+ASK_ALL: Final = ASK_FLAGS + ASK_STATUS + ASK_ATTRIBUTES
+"""The last, so that silence is an answer to the others."""
 RELEASES_BEGIN: Final = "\x1b[>15u"
 """Escape codes for all keys, with their releases and their places on the keyboard (1 + 2 + 4 + 8)."""
 RELEASES_END: Final = "\x1b[<u"
@@ -52,6 +58,9 @@ _ESCAPE: Final = "\x1b"
 _UNFINISHED: Final = re.compile(r"\x1b(?:\[[0-9:;?]{0,64}|O)?$")
 _FLAGS: Final = re.compile(r"\x1b\[\?([0-9]+)u")
 _ATTRIBUTES: Final = re.compile(r"\x1b\[\?[0-9;]*c")
+_STATUSES: Final = ("0", "3")
+"""Parameters of the answer to ASK_STATUS: ready, and not."""
+_STATUS: Final = re.compile(rf"\x1b\[[{''.join(_STATUSES)}]n")
 _NEEDED: Final = 2 | 8
 """Flags with which the release of a letter is reported."""
 _PRESSED: Final = ("", "1")
@@ -101,9 +110,29 @@ def flags_in(answer: str) -> int | None:
     return int(found[-1]) if found else None
 
 
+def has_status(answer: str) -> bool:
+    """Returns whether the terminal has answered ASK_STATUS."""
+    return _STATUS.search(answer) is not None
+
+
 def report_releases(flags: int | None) -> bool:
     """Returns whether a terminal with these flags in force reports the release of every key."""
     return flags is not None and flags & _NEEDED == _NEEDED
+
+
+class Sign(Enum):
+    """What a terminal is asked for, as the request for it."""
+
+    FLAGS = ASK_FLAGS
+    ATTRIBUTES = ASK_ATTRIBUTES
+    STATUS = ASK_STATUS
+
+
+_MARKED: Final = frozenset({3, 4, 6, 12})
+_MARKS_REPEAT: Final = 13
+"""Which of so many requests have a mark: a planar difference set, which agrees with itself shifted by 1 to 12
+requests in one mark alone. Requests at equal distances could be taken for each other as often as answers are
+lost."""
 
 
 class Liveness:
@@ -111,43 +140,76 @@ class Liveness:
 
     It is asked again and again: for its flags if it reports releases, else for its attributes. Its answer
     comes after the keys' events from before: it makes them known as of the moment when the request was sent,
-    however late it is. Each answer counts for the oldest request: where one was lost, those that follow are
-    taken for older than they are.
+    however late it is.
+
+    Answers come in order and without a number, and some are lost: a shell reads them after Ctrl-Z, for
+    example. Each counts for the oldest request that it can be an answer to, so that no key is taken for newer
+    than it is, and the answers to older requests count as lost. Some requests have another one, of another
+    kind, behind them: a mark, by whose answer it shows which requests were answered before it.
 
     Args:
         now_s: When the terminal has answered last.
         releases: Whether it reports releases.
+        marks: Whether it answers ASK_STATUS; for a terminal that reports releases that does not matter.
+            Without it lost answers make all that follow count for older requests.
     """
 
-    def __init__(self, now_s: float, *, releases: bool = True) -> None:
-        self._releases = releases
+    def __init__(self, now_s: float, *, releases: bool = True, marks: bool = True) -> None:
+        self._sign = Sign.FLAGS if releases else Sign.ATTRIBUTES
+        mark = Sign.ATTRIBUTES if releases else Sign.STATUS
+        self._mark = mark if releases or marks else None
         self._known_s = now_s
-        self._asked_s: deque[float] = deque()
-        """When the requests were sent that are not answered yet: at most _MOST_REQUESTS, the oldest first."""
-        self._newest_s = now_s
+        self._awaited: deque[tuple[Sign, float]] = deque()
+        """What was requested when and is not answered yet, the oldest first: MOST_REQUESTS and marks."""
+        self._requests = 0
+        self._unheard = 0
+        """Requests since the newest answer."""
+        self._newest_s = -math.inf
         """When the newest request was sent."""
-        self._ask_s = now_s
-        """When the next one is due."""
 
     @property
     def awaited(self) -> bool:
         """Whether an answer is due."""
-        return bool(self._asked_s)
+        return bool(self._awaited)
 
     def ask(self, now_s: float) -> str:
         """Returns the request that is to be sent now; empty for none."""
-        if now_s < self._ask_s or len(self._asked_s) >= _MOST_REQUESTS:
+        if not self._may_ask(now_s):
             return ""
-        self._asked_s.append(now_s)
-        self._newest_s, self._ask_s = now_s, now_s + ASK_AGAIN_S
-        return ASK_FLAGS if self._releases else ASK_ATTRIBUTES
+        signs = [self._sign]
+        if self._mark and self._requests % _MARKS_REPEAT in _MARKED:
+            signs.append(self._mark)
+        self._awaited.extend((sign, now_s) for sign in signs)
+        self._requests += 1
+        self._unheard += 1
+        self._newest_s = now_s
+        return "".join(sign.value for sign in signs)
 
-    def take(self, flags: int | None) -> None:
-        """Takes an answer, None for its attributes. Without the flags for releases nothing is known."""
-        if self._asked_s and self._releases == (flags is not None):
-            asked_s = self._asked_s.popleft()
+    def take(self, sign: Sign, flags: int | None = None) -> None:
+        """Takes an answer. Without the flags for releases nothing is known.
+
+        Args:
+            sign: What it answers.
+            flags: In an answer to Sign.FLAGS.
+        """
+        if all(sign is not awaited for awaited, _ in self._awaited):
+            return
+        awaited, asked_s = self._awaited.popleft()
+        while awaited is not sign:
+            awaited, asked_s = self._awaited.popleft()
+        self._unheard = 0
+        if sign is self._sign:
             self._known_s = asked_s if flags is None or report_releases(flags) else -math.inf
-            self._ask_s = self._newest_s + ASK_EVERY_S
+
+    def _may_ask(self, now_s: float) -> bool:
+        unanswered_s = [asked_s for sign, asked_s in self._awaited if sign is self._sign]
+        if len(unanswered_s) >= MOST_REQUESTS:
+            return False
+        if sum(now_s - asked_s < ASK_AGAIN_S for asked_s in unanswered_s) >= MOST_AT_ONCE:
+            return False
+        silent = self._unheard - MOST_AT_ONCE
+        pause_s = ASK_EVERY_S if silent < 0 else ASK_AGAIN_S * 2**silent
+        return now_s >= self._newest_s + pause_s
 
     def lasts(self, now_s: float) -> bool:
         """Returns whether the terminal has answered in time."""
@@ -248,6 +310,9 @@ class Hands:
         if parameters.startswith("?"):
             self._answer(parameters[1:], final)
             return None
+        if final == "n" and parameters in _STATUSES:
+            self._heard(Sign.STATUS)
+            return None
         if final == "O" and not parameters:
             self.release()  # Releases go elsewhere now.
             return Action.RELEASE
@@ -266,10 +331,14 @@ class Hands:
         return _action(character, event, modifiers)
 
     def _answer(self, parameters: str, final: str) -> None:
-        if self._liveness and final == "c":
-            self._liveness.take(None)
-        elif self._liveness and final == "u" and parameters.isdigit():
-            self._liveness.take(int(parameters))
+        if final == "c":
+            self._heard(Sign.ATTRIBUTES)
+        elif final == "u" and parameters.isdigit():
+            self._heard(Sign.FLAGS, int(parameters))
+
+    def _heard(self, sign: Sign, flags: int | None = None) -> None:
+        if self._liveness:
+            self._liveness.take(sign, flags)
 
     def _steer(
         self, place: str, direction: Direction | None, event: str, modifiers: int, now_s: float

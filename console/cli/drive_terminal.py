@@ -79,7 +79,9 @@ async def _begin(
                 modes.push(begun.pop_all())
                 hands.begin(releases=True, liveness=Liveness(asked_s))
                 return
-    hands.begin(releases=False, liveness=Liveness(asked_s, releases=False) if answer else None)
+    marks = drive_keys.has_status(answer)
+    liveness = Liveness(asked_s, releases=False, marks=marks) if answer else None
+    hands.begin(releases=False, liveness=liveness)
 
 
 async def _answer(keyboard: Keyboard, hands: Hands, take: Callable[[list[Action]], object]) -> str:

@@ -11,7 +11,9 @@ from tests.support.robotctl import ROBOTCTL
 from tests.support.terminal import Terminal
 
 ALL_FLAGS: Final = 31
-_REQUEST: Final = re.compile(r"\x1b\[(?:>(?P<pushed>\d+)u|(?P<popped><)u|(?P<flags>\?)u|(?P<attributes>c))")
+_REQUEST: Final = re.compile(
+    r"\x1b\[(?:>(?P<pushed>\d+)u|(?P<popped><)u|(?P<flags>\?)u|(?P<attributes>c)|(?P<status>5)n)"
+)
 _ATTENTION_S: Final = 0.01
 
 
@@ -39,14 +41,16 @@ class Kitty:
         answers, end = [], 0
         for request in _REQUEST.finditer(self._written):
             end = request.end()
-            if not self.speaks and not request["attributes"]:
+            if not self.speaks and not (request["attributes"] or request["status"]):
                 continue
             if request["pushed"]:
                 self.pushed.append(int(request["pushed"]))
             elif request["popped"]:
                 self.pushed.pop()
+            elif request["flags"]:
+                answers.append(f"\x1b[?{self.flags}u")
             else:
-                answers.append(f"\x1b[?{self.flags}u" if request["flags"] else "\x1b[?62;c")
+                answers.append("\x1b[0n" if request["status"] else "\x1b[?62;c")
         self._written = self._written[end:]
         return "".join(answers)
 

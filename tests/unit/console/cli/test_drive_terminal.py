@@ -112,7 +112,7 @@ async def test_a_terminal_that_does_not_speak_the_protocol_gets_none_of_it(
             assert not hands.ask(time.monotonic() + 1.0), "it never answers"
         keyboard.give_back()
         await has(shown, "\x1b[?1004l")
-        assert shown.written == "\x1b[?u\x1b[c\x1b[?1004h\x1b[?1004l"
+        assert shown.written == "\x1b[?u\x1b[5n\x1b[c\x1b[?1004h\x1b[?1004l"
 
 
 async def test_an_error_leaves_the_terminal_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -224,6 +224,27 @@ async def test_space_and_x_count_at_once_while_the_first_answers_are_awaited(
         hands = await driving
     assert hands.releases == speaks
     assert hands.steering(time.monotonic()) is None, "no motion begins before"
+
+
+@pytest.mark.parametrize("knows", ["the status", "no status"])
+async def test_a_terminal_is_asked_only_for_what_it_answers(
+    monkeypatch: pytest.MonkeyPatch, knows: str
+) -> None:
+    class WithoutStatus(Kitty):
+        def answer(self, written: str) -> str:
+            return super().answer(written).replace("\x1b[0n", "")
+
+    kitty = (Kitty if knows == "the status" else WithoutStatus)(speaks=False)
+    async with screen(monkeypatch, kitty):
+        keyboard = Keyboard()
+        keyboard.take()
+        async with drive_terminal.reporting_keys(keyboard, ignored) as hands:
+            requests = ""
+            for number in range(1, 14):
+                requests += hands.ask(time.monotonic() + number)
+                hands.take("\x1b[?62;c\x1b[0n", time.monotonic())
+        keyboard.give_back()
+    assert ("\x1b[5n" in requests) == (knows == "the status")
 
 
 async def test_ctrl_s_holds_up_neither_the_program_nor_its_keys(monkeypatch: pytest.MonkeyPatch) -> None:
