@@ -19,6 +19,7 @@ from nats.aio.client import Client
 from nats.aio.msg import Msg
 from nats.aio.subscription import Subscription
 from nats.aio.transport import TcpTransport
+from nats.nuid import NUID
 from nats.protocol.parser import AWAITING_CONTROL_LINE, PERMISSIONS_ERR, Parser
 
 from common.deadline import within
@@ -129,194 +130,34 @@ class _Transport(TcpTransport):
         return self._io_writer
 
 
-class NatsClient(Client):
-    """The library's client of one server.
+class _BoundedClient(Client):
+    """The library's client, with bounds on what a server can make it do. What it overrides are its hooks.
+
+    Each other name here could be one of a later release: tests/unit/fleet/test_nats_client.py compares them.
 
     Args:
-        server: as "tls://host:4222".
         not_taken: counts what is not taken of its messages.
-        listener: is notified.
     """
 
-    def __init__(self, server: str, not_taken: NotTaken, listener: Listener) -> None:
+    def __init__(self, not_taken: NotTaken) -> None:
         super().__init__()
         self._ps = _BoundedParser(self)
         self._own_transport = _Transport()  # type: ignore[no-untyped-call]  # the library's
         self._transport = self._own_transport
-        self._address = server
         self._not_taken = not_taken
-        self._listener = listener
-        self._reported: Exception | None = None
-        """The newest error that the library reported beside the calls."""
-        self._farewell = ""
+        self.farewell = ""
         """What the server said before it closed the connection; the library keeps the last error only."""
 
-    async def open(self, inbox: str, *, name: str, credentials: Path | None, ca: Path | None) -> None:
-        """Connects, and listens to the subjects of an inbox.
-
-        Args:
-            inbox: prefix of the subjects.
-            name: shown in the servers' lists of connections.
-            credentials: a .creds file.
-            ca: authority of the server's certificate.
-
-        Raises:
-            UnreachableError: the server can't be reached, or is not who it has to be.
-            RefusedError: it does not accept the credentials.
-        """
-        options = self._authentication(credentials, ca)
-        try:
-            async with asyncio.timeout(CONNECT_TIMEOUT_S):
-                await self.connect(
-                    servers=[self._address],
-                    name=name,
-                    error_cb=self._on_error,
-                    closed_cb=self._on_closed,
-                    allow_reconnect=False,
-                    # How often the library tries again in here; 0 would be for ever.
-                    max_reconnect_attempts=1,
-                    reconnect_time_wait=0,
-                    connect_timeout=CONNECT_TIMEOUT_S,  # type: ignore[arg-type]  # any number of seconds
-                    ping_interval=_PING_INTERVAL_S,
-                    max_outstanding_pings=_PINGS_WITHOUT_ANSWER,
-                    flush_timeout=CONNECT_TIMEOUT_S,
-                    **options,
-                )
-                _repeat_cancellation()
-                self.check(encrypted=ca is not None)
-                await self._subscribe(f"{inbox}.*", self._listener.on_reply)
-                await self._flush()
-        except Exception as error:
-            # The library trips over what is no server of NATS in many ways: a greeting may be anything.
-            await self.shut()
-            raise _connect_error(self._address, self._reported or error) from error
-        except asyncio.CancelledError:
-            # A silent server would be waited for until the time-out of the end of TLS.
-            self.abort()
-            await self.shut()
-            raise
-
-    async def shut(self) -> None:
-        """Closes the connection, and leaves no socket behind."""
-        try:
-            with suppress(TimeoutError, OSError, nats_errors.Error):
-                await within(CONNECT_TIMEOUT_S, self.close())
-        finally:
-            # The socket of a server that does not take what is left would stay open.
-            self.abort()
+    @property
+    def is_encrypted(self) -> bool:
+        """Whether TLS is in use; known before anything is said to the server."""
+        return bool(self._server_info.get("tls_required"))
 
     def abort(self) -> None:
         """Closes the connection without what waits to be sent."""
         self._pending.clear()
         self._pending_data_size = 0
         self._own_transport.abort()
-
-    async def post(self, subject: str, payload: bytes, reply: str, headers: dict[str, str] | None) -> None:
-        """Hands a message to the connection.
-
-        Raises:
-            UnreachableError, HubError: it can't be sent.
-        """
-        if not self.is_connected:
-            raise UnreachableError("the connection to the hub is lost")
-        # The library knows the limit of the server alone, which is a higher one.
-        if len(payload) > LARGEST_MESSAGE:
-            raise _too_large(payload)
-        try:
-            await self.publish(subject, payload, reply, headers)
-        except nats_errors.MaxPayloadError as error:
-            raise _too_large(payload) from error
-        except (nats_errors.BadSubjectError, nats_errors.BadHeaderError) as error:
-            raise HubError(HubReason.INVALID, f"'{subject[:100]}' is no subject") from error
-        except (OSError, nats_errors.Error) as error:
-            raise _lost(error) from error
-
-    async def listen(self, subject: str, callback: Callback, queue: str = "") -> Subscription:
-        """Subscribes to a subject; what comes too fast is dropped.
-
-        Raises:
-            UnreachableError: the connection is lost.
-        """
-        with _raising_lost():
-            return await self._subscribe(subject, callback, queue)
-
-    async def confirm(self) -> None:
-        """Returns when the server has taken all that was sent before.
-
-        Raises:
-            UnreachableError: the connection is lost.
-        """
-        with _raising_lost():
-            await self._flush()
-
-    def new_id(self) -> str:
-        """Returns an ID that no other client has."""
-        return self._nuid.next().decode()
-
-    def encrypted(self) -> bool:
-        """Whether TLS is in use; asked before anything is said to the server."""
-        return bool(self._server_info.get("tls_required"))
-
-    def check(self, *, encrypted: bool) -> None:
-        """Checks that the connection is one as required.
-
-        Raises:
-            UnreachableError: it is not.
-        """
-        if not self.is_connected:
-            raise UnreachableError("it does not speak as a NATS server does")
-        if encrypted and not self.encrypted():
-            raise UnreachableError("it does not offer TLS")
-        size: Any = self._max_payload  # As the server has it.
-        if not isinstance(size, int):
-            raise UnreachableError("its greeting names no size of messages")
-
-    def _authentication(self, credentials: Path | None, ca: Path | None) -> dict[str, Any]:
-        options: dict[str, Any] = {}
-        if ca is not None:
-            options["tls"] = _tls_context(ca)
-        if credentials is not None:
-            creds = Credentials.read(credentials)
-            options["user_jwt_cb"] = creds.jwt.encode
-            options["signature_cb"] = lambda nonce: self._signed(creds, nonce, encrypted=ca is not None)
-        return options
-
-    def _signed(self, creds: Credentials, nonce: str, *, encrypted: bool) -> bytes:
-        """Signs the server's challenge.
-
-        Raises:
-            UnreachableError: TLS is required but not in use; who sits in between could pass the signature on.
-        """
-        if encrypted and not self.encrypted():
-            raise UnreachableError("the server does not offer TLS")
-        return base64.b64encode(creds.key.sign(nonce.encode()))
-
-    async def _subscribe(self, subject: str, callback: Callback, queue: str = "") -> Subscription:
-        async def on_message(msg: Msg) -> None:
-            await callback(Message(msg.subject, msg.data, msg.headers or {}, msg.reply))
-
-        return await self.subscribe(
-            subject,
-            queue=queue,
-            cb=on_message,
-            pending_msgs_limit=MAX_WAITING_MESSAGES,
-            pending_bytes_limit=MAX_WAITING,
-        )
-
-    async def _flush(self) -> None:
-        await self.flush(CONNECT_TIMEOUT_S)  # type: ignore[arg-type]  # any number of seconds
-        _repeat_cancellation()
-
-    async def _on_error(self, error: Exception) -> None:
-        self._reported = error
-        self._not_taken.dropped += isinstance(error, nats_errors.SlowConsumerError)
-        self._listener.on_error(_text(error))
-
-    async def _on_closed(self) -> None:
-        error = nats_errors.Error(self._farewell) if self._farewell else self.last_error
-        self._listener.on_lost(_connect_error(self._address, error or nats_errors.ConnectionClosedError()))
-
-    # --- the library's own methods, with bounds on what a server can make them do ---
 
     async def _process_op_err(self, e: Exception) -> None:
         # What waits to be sent is lost with the connection. The library would try to send it when it closes,
@@ -363,13 +204,192 @@ class NatsClient(Client):
 
     async def _process_err(self, err_msg: str) -> None:
         if PERMISSIONS_ERR not in err_msg:
-            self._farewell = self._farewell or err_msg.strip("'")
+            self.farewell = self.farewell or err_msg.strip("'")
         await super()._process_err(err_msg)
 
     async def _process_info(self, info: dict[str, Any], initial_connection: bool = False) -> None:
         # Servers are those of the configuration, and TLS names with them.
         info.pop("connect_urls", None)
         await super()._process_info(info, initial_connection)
+
+
+class NatsClient:
+    """A client of one server.
+
+    Args:
+        server: as "tls://host:4222".
+        not_taken: counts what is not taken of its messages.
+        listener: is notified.
+    """
+
+    def __init__(self, server: str, not_taken: NotTaken, listener: Listener) -> None:
+        self._client = _BoundedClient(not_taken)
+        self._address = server
+        self._not_taken = not_taken
+        self._listener = listener
+        self._reported: Exception | None = None
+        """The newest error that the library reported beside the calls."""
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether the connection stands, as far as is known."""
+        return self._client.is_connected
+
+    async def open(self, inbox: str, *, name: str, credentials: Path | None, ca: Path | None) -> None:
+        """Connects, and listens to the subjects of an inbox.
+
+        Args:
+            inbox: prefix of the subjects.
+            name: shown in the servers' lists of connections.
+            credentials: a .creds file.
+            ca: authority of the server's certificate.
+
+        Raises:
+            UnreachableError: the server can't be reached, or is not who it has to be.
+            RefusedError: it does not accept the credentials.
+        """
+        options = self._authentication(credentials, ca)
+        try:
+            async with asyncio.timeout(CONNECT_TIMEOUT_S):
+                await self._client.connect(
+                    servers=[self._address],
+                    name=name,
+                    error_cb=self._on_error,
+                    closed_cb=self._on_closed,
+                    allow_reconnect=False,
+                    # How often the library tries again in here; 0 would be for ever.
+                    max_reconnect_attempts=1,
+                    reconnect_time_wait=0,
+                    connect_timeout=CONNECT_TIMEOUT_S,  # type: ignore[arg-type]  # any number of seconds
+                    ping_interval=_PING_INTERVAL_S,
+                    max_outstanding_pings=_PINGS_WITHOUT_ANSWER,
+                    flush_timeout=CONNECT_TIMEOUT_S,
+                    **options,
+                )
+                _repeat_cancellation()
+                self._check(encrypted=ca is not None)
+                await self._subscribe(f"{inbox}.*", self._listener.on_reply)
+                await self._flush()
+        except Exception as error:
+            # The library trips over what is no server of NATS in many ways: a greeting may be anything.
+            await self.close()
+            raise _connect_error(self._address, self._reported or error) from error
+        except asyncio.CancelledError:
+            # A silent server would be waited for until the time-out of the end of TLS.
+            self._client.abort()
+            await self.close()
+            raise
+
+    async def close(self) -> None:
+        """Closes the connection, and leaves no socket behind."""
+        try:
+            with suppress(TimeoutError, OSError, nats_errors.Error):
+                await within(CONNECT_TIMEOUT_S, self._client.close())
+        finally:
+            # The socket of a server that does not take what is left would stay open.
+            self._client.abort()
+
+    async def publish(self, subject: str, payload: bytes, reply: str, headers: dict[str, str] | None) -> None:
+        """Hands a message to the connection.
+
+        Raises:
+            UnreachableError, HubError: it can't be sent.
+        """
+        if not self.is_connected:
+            raise UnreachableError("the connection to the hub is lost")
+        # The library knows the limit of the server alone, which is a higher one.
+        if len(payload) > LARGEST_MESSAGE:
+            raise _too_large(payload)
+        try:
+            await self._client.publish(subject, payload, reply, headers)
+        except nats_errors.MaxPayloadError as error:
+            raise _too_large(payload) from error
+        except (nats_errors.BadSubjectError, nats_errors.BadHeaderError) as error:
+            raise HubError(HubReason.INVALID, f"'{subject[:100]}' is no subject") from error
+        except (OSError, nats_errors.Error) as error:
+            raise _lost(error) from error
+
+    async def subscribe(self, subject: str, callback: Callback, queue: str = "") -> Subscription:
+        """Subscribes to a subject; what comes too fast is dropped.
+
+        Raises:
+            UnreachableError: the connection is lost.
+        """
+        with _raising_lost():
+            return await self._subscribe(subject, callback, queue)
+
+    async def flush(self) -> None:
+        """Returns when the server has taken all that was sent before.
+
+        Raises:
+            UnreachableError: the connection is lost.
+        """
+        with _raising_lost():
+            await self._flush()
+
+    def new_id(self) -> str:
+        """Returns an ID that no other client has."""
+        return NUID().next().decode()
+
+    def _check(self, *, encrypted: bool) -> None:
+        """Checks that the connection is one as required.
+
+        Raises:
+            UnreachableError: it is not.
+        """
+        if not self.is_connected:
+            raise UnreachableError("it does not speak as a NATS server does")
+        if encrypted and not self._client.is_encrypted:
+            raise UnreachableError("it does not offer TLS")
+        size: Any = self._client.max_payload  # As the server has it.
+        if not isinstance(size, int):
+            raise UnreachableError("its greeting names no size of messages")
+
+    def _authentication(self, credentials: Path | None, ca: Path | None) -> dict[str, Any]:
+        options: dict[str, Any] = {}
+        if ca is not None:
+            options["tls"] = _tls_context(ca)
+        if credentials is not None:
+            creds = Credentials.read(credentials)
+            options["user_jwt_cb"] = creds.jwt.encode
+            options["signature_cb"] = lambda nonce: self._signed(creds, nonce, encrypted=ca is not None)
+        return options
+
+    def _signed(self, creds: Credentials, nonce: str, *, encrypted: bool) -> bytes:
+        """Signs the server's challenge.
+
+        Raises:
+            UnreachableError: TLS is required but not in use; who sits in between could pass the signature on.
+        """
+        if encrypted and not self._client.is_encrypted:
+            raise UnreachableError("the server does not offer TLS")
+        return base64.b64encode(creds.key.sign(nonce.encode()))
+
+    async def _subscribe(self, subject: str, callback: Callback, queue: str = "") -> Subscription:
+        async def on_message(msg: Msg) -> None:
+            await callback(Message(msg.subject, msg.data, msg.headers or {}, msg.reply))
+
+        return await self._client.subscribe(
+            subject,
+            queue=queue,
+            cb=on_message,
+            pending_msgs_limit=MAX_WAITING_MESSAGES,
+            pending_bytes_limit=MAX_WAITING,
+        )
+
+    async def _flush(self) -> None:
+        await self._client.flush(CONNECT_TIMEOUT_S)  # type: ignore[arg-type]  # any number of seconds
+        _repeat_cancellation()
+
+    async def _on_error(self, error: Exception) -> None:
+        self._reported = error
+        self._not_taken.dropped += isinstance(error, nats_errors.SlowConsumerError)
+        self._listener.on_error(_text(error))
+
+    async def _on_closed(self) -> None:
+        farewell = self._client.farewell
+        error = nats_errors.Error(farewell) if farewell else self._client.last_error
+        self._listener.on_lost(_connect_error(self._address, error or nats_errors.ConnectionClosedError()))
 
 
 def _tls_context(ca: Path) -> ssl.SSLContext:

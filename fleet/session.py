@@ -60,7 +60,7 @@ class Session:
 
     async def close(self) -> None:
         """Closes the connection; what waits for an answer fails."""
-        await self._client.shut()
+        await self._client.close()
         self.on_lost(UnreachableError(f"the connection to {self.server} is closed"))
 
     async def publish(self, subject: str, payload: bytes) -> None:
@@ -130,7 +130,7 @@ class Session:
                 waiter.take(message)
 
             inbox = reply.replace(".", ".s.", 1)
-            subscription = await self._client.listen(f"{inbox}.*", on_message)
+            subscription = await self._client.subscribe(f"{inbox}.*", on_message)
             try:
                 yield waiter, inbox
             finally:
@@ -143,9 +143,9 @@ class Session:
         Raises:
             UnreachableError: the connection is lost.
         """
-        await self._client.listen(subject, callback, queue)
+        await self._client.subscribe(subject, callback, queue)
         # What is published after this, the server passes on.
-        await self._client.confirm()
+        await self._client.flush()
 
     async def on_reply(self, message: Message) -> None:
         """Hands a message of the inbox to what waits for it."""
@@ -179,4 +179,4 @@ class Session:
         self, subject: str, payload: bytes, reply: str, headers: dict[str, str] | None
     ) -> None:
         self._check()
-        await self._client.post(subject, payload, reply, headers)
+        await self._client.publish(subject, payload, reply, headers)

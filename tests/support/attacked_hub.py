@@ -38,10 +38,11 @@ async def store_with_status(session: Session, subject: str, status: str) -> None
     name, headers = subject.encode(), f"NATS/1.0 {status}\r\n\r\n".encode()
     with session.waiter(subject) as (waiter, reply):
         sizes = b"%d %d" % (len(headers), len(headers) + len(name))
-        await session._client._send_command(
+        client = session._client._client
+        await client._send_command(
             b"HPUB %s %s %s\r\n%s%s\r\n" % (name, reply.encode(), sizes, headers, name)
         )
-        await session._client._flush_pending()
+        await client._flush_pending()
         assert "seq" in parsed((await waiter.get(_CONNECT_S)).payload)
 
 

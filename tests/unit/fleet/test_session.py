@@ -7,14 +7,13 @@ from typing import Any
 
 import pytest
 
-from fleet import session
+from fleet import nats_client
 from fleet.errors import UnreachableError
-from fleet.nats_client import NatsClient
 from fleet.replies import NotTaken
 from fleet.session import Session
 
 
-class _Connecting(NatsClient):
+class _Connecting(nats_client._BoundedClient):
     """Connects when a test says so, and waits as the library does."""
 
     def __init__(self, *args: Any) -> None:
@@ -27,8 +26,9 @@ class _Connecting(NatsClient):
     async def close(self) -> None:
         """There is nothing to close."""
 
-    def check(self, *, encrypted: bool) -> None:
-        pytest.fail(f"it went on although it was cancelled (TLS: {encrypted})")
+    @property
+    def is_connected(self) -> bool:
+        pytest.fail("it went on although it was cancelled")
 
 
 async def test_a_cancellation_that_comes_with_the_connection_is_not_lost(
@@ -40,7 +40,7 @@ async def test_a_cancellation_that_comes_with_the_connection_is_not_lost(
         clients.append(_Connecting(*args))
         return clients[-1]
 
-    monkeypatch.setattr(session, "NatsClient", client)
+    monkeypatch.setattr(nats_client, "_BoundedClient", client)
     opening = asyncio.create_task(
         Session.open("nats://127.0.0.1:1", credentials=None, ca=None, inbox="_INBOX", name="")
     )
