@@ -25,24 +25,35 @@ _EVERY_S: Final = 0.1
 
 
 def start_reaper(name: str, value: str) -> None:
-    """Has what bears this variable ended after this process."""
+    """Has what bears this variable ended after this process.
+
+    Raises:
+        RuntimeError: the reaper could not start, with what it said.
+    """
     others = {each: text for each, text in os.environ.items() if each != name}
     # Its first process returns at once, and leaves the second one to the system.
-    subprocess.run(
+    started = subprocess.run(
         [sys.executable, "-I", "-S", __file__, str(os.getpid()), f"{name}={value}"],
         env=others,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
         start_new_session=True,
-        check=True,
+        check=False,
     )
+    if started.returncode:
+        raise RuntimeError(f"nothing would end what the tests leave behind: {started.stderr.strip()}")
 
 
 def _reap(pid: int, variable: bytes) -> None:
-    process = os.pidfd_open(pid)
+    try:
+        process = os.pidfd_open(pid)
+    except OSError as error:
+        sys.exit(f"pidfd_open({pid}) is refused: {error.strerror}")
     if os.fork():
         return
+    os.dup2(sys.stdout.fileno(), sys.stderr.fileno())  # The pipe that the first process reports to ends.
     os.chdir("/")
     ended = select.poll()
     ended.register(process, select.POLLIN)
