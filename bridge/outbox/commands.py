@@ -15,10 +15,14 @@ MOST_COMMANDS: Final = 1024
 
 
 def restore(db: sqlite3.Connection) -> None:
-    """Ends commands that a bad disk has changed: they have no result that can be sent, or no ID for it."""
+    """Ends commands that a bad disk has changed: they have no result that can be sent, or no ID for it.
+
+    One without an ID stays as it is; once it has ended, it is not reported again.
+    """
     changed = db.execute(
-        "UPDATE commands SET result = x'', sent = 1 WHERE typeof(result) NOT IN ('null', 'blob')"
-        " OR typeof(command_id) <> 'text' OR command_id GLOB '*[^A-Za-z0-9]*'"
+        "UPDATE commands SET result = x'', sent = 1 WHERE (typeof(result) NOT IN ('null', 'blob')"
+        " OR typeof(command_id) <> 'text' OR command_id GLOB '*[^A-Za-z0-9]*')"
+        " AND NOT (result IS x'' AND sent IS 1)"
     )
     if changed.rowcount:
         _log.error("commands that the disk has changed get no result: %d", changed.rowcount)

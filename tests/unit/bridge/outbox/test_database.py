@@ -536,6 +536,22 @@ def test_a_command_that_no_bridge_writes_has_no_result(tmp_path: Path, what: str
     assert not (tmp_path / DAMAGED_NAME).exists()
 
 
+@pytest.mark.parametrize("what", ["result = 'done'", "command_id = 'a b'"])
+def test_a_command_that_the_disk_has_changed_is_reported_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, what: str
+) -> None:
+    """The defect: at each start, and after each error of the outbox."""
+    with closing(opened(tmp_path)) as first:
+        first.end_command("a1", b"done")
+    change(tmp_path, f"commands SET {what} WHERE command_id = 'a1'")
+    for _ in range(3):
+        with closing(opened(tmp_path)) as again:
+            again.open()
+    assert [each.getMessage() for each in caplog.records] == [
+        "commands that the disk has changed get no result: 1"
+    ]
+
+
 def test_an_uploads_row_that_is_no_utf_8_is_read(tmp_path: Path) -> None:
     """It is judged by its reader. The defect: an error of the outbox, at each start."""
     with closing(opened(tmp_path)) as first:
