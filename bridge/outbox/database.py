@@ -16,9 +16,9 @@ from typing import Final
 from bridge.outbox import commands, meta
 from bridge.outbox.cursor import Cursor, read_cursor, remove_leftovers, write_cursor
 from bridge.outbox.items import (
-    all_make_sense,
     batch_between,
     drop_oldest,
+    examine,
     first_batch,
     insert,
     lose,
@@ -386,16 +386,17 @@ class Database:
         db.execute("DELETE FROM items WHERE id < ?", (cursor.first_id,))
         meta.restore_counts(db)
         commands.restore(db)
-        restore(db)
+        found = examine(db)
+        if found.not_as_written:
+            restore(db)
         if not meta.position_makes_sense(db):
             raise _DamagedError("its position makes no sense")
-        if not all_make_sense(db):
+        if found.senseless:
             raise _DamagedError("a row makes no sense")
         sent = (cursor.run_id, cursor.last) if cursor.last_id else None
         if (newest_place(db) or sent) not in (None, (meta.get(db, "run_id"), meta.get(db, "sequence"))):
             raise _DamagedError("its position is not the one after what it has")
-        (events,) = db.execute("SELECT count(*) FROM items WHERE payload IS NOT NULL").fetchone()
-        meta.put(db, "events", events)
+        meta.put(db, "events", found.events)
         db.execute("COMMIT")
         self._cursor, self._flight = cursor, cursor.last_id
         batch = self._in_flight(db)

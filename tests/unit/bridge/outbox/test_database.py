@@ -441,11 +441,14 @@ def test_nor_does_it_in_the_gap_that_takes_the_events_place(tmp_path: Path, what
     again.close()
 
 
-def test_an_event_that_is_no_bytes_becomes_a_gap(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "what", ["payload = 7", "payload = 7, last = 'x', reason = 99, earlier = 'x', probes = 'x'"]
+)
+def test_an_event_that_is_no_bytes_becomes_a_gap(tmp_path: Path, what: str) -> None:
     first = opened(tmp_path)
     add(first, event(1), event(2), event(3))
     first.close()
-    change(tmp_path, "items SET payload = 7 WHERE first = 2")
+    change(tmp_path, f"items SET {what} WHERE first = 2")
     again = opened(tmp_path)
     assert taken(again) == [event(1), Gap(RUN, 2, 2, DropReason.OUTBOX_LOST, worst=1), event(3)]
     assert (again.facts.sent, again.facts.dropped) == (2, 1)
@@ -550,6 +553,33 @@ def test_a_command_that_the_disk_has_changed_is_reported_once(
     assert [each.getMessage() for each in caplog.records] == [
         "commands that the disk has changed get no result: 1"
     ]
+
+
+def test_the_rows_of_a_whole_outbox_are_scanned_once_as_it_is_opened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Besides SQLite's own check. The defect: five times, and the gateway waits until it is open."""
+    with closing(opened(tmp_path)) as first:
+        add(first, event(1), event(2), Gap(RUN, 3, 3, DropReason.DISK))
+    connect, statements = Database._connect, list[str]()
+
+    def traced(self: Database) -> sqlite3.Connection:
+        db = connect(self)
+        db.set_trace_callback(statements.append)
+        return db
+
+    monkeypatch.setattr(Database, "_connect", traced)
+    with closing(opened(tmp_path)) as again:
+        again.open()
+    with closing(sqlite3.connect(tmp_path / NAME)) as db:
+        scans = [
+            each
+            for each in statements
+            if each.lstrip().startswith(("SELECT", "UPDATE", "DELETE")) and "LIMIT" not in each
+            for row in db.execute(f"EXPLAIN QUERY PLAN {each}")
+            if row[3].startswith("SCAN items")
+        ]
+    assert len(scans) == 1, scans
 
 
 def test_an_uploads_row_that_is_no_utf_8_is_read(tmp_path: Path) -> None:
