@@ -6,7 +6,7 @@
 | `enroll` for an enrolled robot | refused, unless `again`: then new keys, and the old ones are revoked |
 | a server is down during `revoke` | the others refuse the robot at once, it within 15 s of its start |
 | a server is silent | another one is tried beside it after 1 s; what it led, until there is a leader again |
-| a hub of an earlier version is administered | all but `apply` is refused, which moves its people first |
+| a hub of an earlier version is administered | what needs people's accounts is refused until `apply` |
 | nothing of the hub answers during `revoke` | the revocation is in the directory; `apply` repeats it |
 | a server loses its disk | it knows the revocations of its nats.conf, and all after `apply` |
 """

@@ -89,7 +89,9 @@ def apply(
     ] = None,
     recordings_mib: Annotated[
         int | None,
-        typer.Option(min=1, help=f"Room for the list of recordings; {RECORDINGS_BYTES // _MIB} at first."),
+        typer.Option(
+            min=1, help=f"Room for the list of recordings, in MiB; {RECORDINGS_BYTES // _MIB} at first."
+        ),
     ] = None,
 ) -> None:
     """Create what is missing at the hub, make more room where that is asked for, repeat revocations.

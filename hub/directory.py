@@ -19,7 +19,6 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal, Self
 
-from common.ca import KeyPair
 from common.errors import ExitCode, UserError
 from common.private_files import directory_lock, write_private
 from fleet.connection import FleetAddress
@@ -39,8 +38,8 @@ class User:
     Attributes:
         name: of the robot, person or receiver.
         kind: which of them.
-        key: public keys that were issued; the last one is in use.
-        revoked: the time in s since 1970 up to which tokens are not valid; None: not revoked.
+        keys: public keys that were issued; the last one is in use.
+        revoked: when it was revoked, in s since 1970; None: it was not.
     """
 
     name: str
@@ -57,8 +56,8 @@ class HubRecord:
         fleet: its name.
         servers: for clients, as "tls://host:4222".
         replicas: nodes that keep each message.
-        users: by kind and name.
-        revoked: public keys that are not valid any more, with the time in s since 1970 up to which.
+        users: no two with the same kind and name.
+        revoked: public keys that are not valid any more, with when they were revoked, in s since 1970.
         issued: when the newest tokens of the accounts were issued, in s since 1970.
     """
 
@@ -165,14 +164,6 @@ class HubDirectory:
     def missing_accounts(self) -> tuple[KeyName, ...]:
         """Returns the accounts that a hub of an earlier version lacks."""
         return tuple(name for name in ACCOUNTS_OF_PEOPLE if not (self.path / "keys" / f"{name}.nk").exists())
-
-    def ca(self) -> KeyPair:
-        """Reads the authority of the servers' certificates.
-
-        Raises:
-            UserError: it is missing.
-        """
-        return KeyPair(self.secret("keys/ca.pem"), self.secret("keys/ca.key"))
 
     def secret(self, name: str) -> bytes:
         """Reads a file of the directory.

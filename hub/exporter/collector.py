@@ -46,7 +46,7 @@ _SEVERITIES: Final[Mapping["fault_pb2.FaultSeverity.ValueType", str]] = {
 class SeenState:
     """The newest value of a robot's key.
 
-    Args:
+    Attributes:
         state: None if it is not readable.
         received_unix_ms: When the hub took it, by the hub's clock.
     """
@@ -59,7 +59,7 @@ class SeenState:
 class RobotSample:
     """An enrolled robot at one instant.
 
-    Args:
+    Attributes:
         name: Its name.
         standing: Where it stands.
         age_s: Age of its newest state; None without one.

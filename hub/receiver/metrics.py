@@ -20,7 +20,7 @@ class ReceiverMetrics:
         self._registry = CollectorRegistry()
         self._requests = Counter(
             f"{_PREFIX}_requests",
-            "Requests of robots, by name and outcome.",
+            "Requests of robots and people, by name and outcome.",
             ("request", "outcome"),
             registry=self._registry,
         )
