@@ -142,6 +142,12 @@ def revoke(
     receiver: Annotated[bool, typer.Option("--receiver", help="A receiver, not a robot.")] = False,
 ) -> None:
     """Make all credentials invalid; connections end at once."""
+    if operator and receiver:
+        raise UserError(
+            f"'{name}' is either a person or a receiver",
+            "Leave out --operator or --receiver",
+            exit_code=ExitCode.USAGE,
+        )
     kind: Kind = "operator" if operator else "receiver" if receiver else "robot"
     hub = HubDirectory(directory)
     try:
