@@ -44,7 +44,9 @@ def init(
     config: Config = None,
     directory: Directory = None,
     host: Hosts = None,
-    again: Annotated[bool, typer.Option(help="Discard existing credentials.")] = False,
+    again: Annotated[
+        bool, typer.Option("--again", help="Discard existing credentials.", show_default=False)
+    ] = False,
 ) -> None:
     """Create this robot's certificate authority, the gateway's certificate and an empty list."""
     settings, files = _open(config, directory)
@@ -72,7 +74,10 @@ def add(
     *,
     config: Config = None,
     directory: Directory = None,
-    certificate: Annotated[bool, typer.Option(help="A client certificate instead of a token.")] = False,
+    certificate: Annotated[
+        bool,
+        typer.Option("--certificate", help="A client certificate instead of a token.", show_default=False),
+    ] = False,
     days: Annotated[
         float | None,
         typer.Option(min=0.0001, max=36500, help=_DAYS_HELP),

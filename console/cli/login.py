@@ -41,7 +41,9 @@ def login(
     ] = STANDARD_INPUT,
     *,
     ca: Annotated[Path | None, typer.Option(help="Replace the robot's CA certificate only (PEM).")] = None,
-    offline: Annotated[bool, typer.Option(help="Store it without contacting the robot.")] = False,
+    offline: Annotated[
+        bool, typer.Option("--offline", help="Store it without contacting the robot.", show_default=False)
+    ] = False,
     replacing: Annotated[
         bool,
         typer.Option("--replace", help="Store it over the robot's present login.", show_default=False),

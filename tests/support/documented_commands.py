@@ -21,6 +21,8 @@ PAGES: Final = (
 )
 _NOT_COMMANDS: Final = ("python", "yaml", "toml", "json", "text")
 _MARK: Final = re.compile(r"\s*<!-- not run(?: `(?P<beginning>[^`]+)`)?: (?P<reason>.+) -->")
+_SPAN: Final = re.compile(r"`([^`\n]+(?:\n[^`\n]+)?)`")
+"""Code within a line, or within two: prose is wrapped."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,8 @@ class Block:
     text: str
     reason: str = ""
     """Why it is not run; empty: it is."""
+    whole: str = ""
+    """With the lines that are not run."""
 
     @property
     def name(self) -> str:
@@ -67,12 +71,22 @@ def blocks(page: str) -> Iterator[Block]:
             mark = None
 
 
+def typed(page: str) -> Iterator[str]:
+    """Yields what a page has one type: code within the text, and lines of blocks, without comments."""
+    for span in _SPAN.findall((ROOT / page).read_text(encoding="utf-8")):
+        yield " ".join(span.replace("\\|", "|").split())
+    for block in blocks(page):
+        if "synopsis" not in block.reason:
+            for line in block.whole.splitlines():
+                yield line.partition(" #")[0]
+
+
 def _block(page: str, line: int, body: list[str], mark: re.Match[str] | None) -> Block:
-    reason = ""
+    reason, whole = "", "\n".join(body)
     if mark and mark["beginning"]:
         kept = [each for each in body if not each.startswith(mark["beginning"])]
         assert len(kept) < len(body), f"{page}:{line} has no line that begins with {mark['beginning']}"
         body = kept
     elif mark:
         reason = mark["reason"]
-    return Block(page, line, "\n".join(body), reason)
+    return Block(page, line, "\n".join(body), reason, whole)
