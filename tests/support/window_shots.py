@@ -23,6 +23,7 @@ _SITUATIONS: Final = (
     "recording",
     "dark",
     "view",
+    "view-maximised",
 )
 _FRAMES: Final = 5
 _HISTORY_S: Final = 4.0
@@ -63,7 +64,8 @@ def main() -> None:
         application = QApplication(["window-shots"])
         application.setStyle("Fusion")
         in_colours(DARK if situation == "dark" else LIGHT)
-        found = _view(Path(name), file) if situation == "view" else _cockpit(situation, Path(name), file)
+        take = _view if situation.startswith("view") else _cockpit
+        found = take(situation, Path(name), file)
     print(json.dumps(found))
 
 
@@ -93,7 +95,7 @@ def _cockpit(situation: str, directory: Path, file: Path) -> Mapping[str, Any]:
         return {**_look(window, file), "maximised": window.isMaximized()}
 
 
-def _view(directory: Path, file: Path) -> Mapping[str, Any]:
+def _view(situation: str, directory: Path, file: Path) -> Mapping[str, Any]:
     from console.viewer.summary import FrameCounter  # noqa: PLC0415
     from console.window.programs import viewing  # noqa: PLC0415
     from tests.support.cockpit import seeing_robot  # noqa: PLC0415
@@ -104,9 +106,11 @@ def _view(directory: Path, file: Path) -> Mapping[str, Any]:
         viewing(robot.target, None, FrameCounter()) as window,
         _frames(window.video) as frames,
     ):
+        if situation == "view-maximised":
+            window.showMaximized()
         until(lambda: frames() >= _FRAMES, "the picture")
         let_pass(1.5)
-        return _look(window, file)
+        return {**_look(window, file), "maximised": window.isMaximized()}
 
 
 @contextmanager

@@ -1,4 +1,7 @@
-"""The windows on screens from 1024x600 to 4K; each screenshot is an artefact."""
+"""The windows on screens from 1024x600 to 4K.
+
+Each screenshot is an artefact in artifacts/monitor or artifacts/view, named by its situation and the screen.
+"""
 
 import json
 import subprocess
@@ -17,15 +20,18 @@ ROOT = Path(__file__).parents[4]
 ENDS_WITHIN_S = 150
 
 
-def shot(situation: str, width: int, height: int, scale: int = 1) -> Mapping[str, Any]:
+def shot(situation: str, width: int, height: int, scale: int) -> Mapping[str, Any]:
     """Takes a screenshot in a process of its own; returns what the window reports of itself."""
-    file = KEPT_IN / f"{situation}-{width}x{height}.png"
+    folder = KEPT_IN.with_name("view") if situation.startswith("view") else KEPT_IN
+    file = folder / f"{situation}-{width}x{height}.png"
+    file.unlink(missing_ok=True)
     command = [sys.executable, "-m", "tests.support.window_shots", situation]
     command += [str(width), str(height), str(scale), str(file)]
     done = subprocess.run(
         command, cwd=ROOT, capture_output=True, text=True, timeout=ENDS_WITHIN_S, check=False
     )
     assert done.returncode == 0, done.stderr
+    assert file.exists()
     found: Mapping[str, Any] = json.loads(done.stdout.splitlines()[-1])
     return found
 
@@ -54,8 +60,24 @@ def test_the_cockpit_fills_the_screen(
     assert found["picture_share"] >= share
 
 
-def test_the_view_fits_a_small_screen() -> None:
-    found = shot("view", 1024, 600)
-    assert found["window"][0] <= 1024
-    assert found["window"][1] <= 600
+@pytest.mark.parametrize(
+    ("width", "height", "share"),
+    [pytest.param(1024, 600, 0.85, id="smaller than a frame"), pytest.param(1280, 800, 0.92, id="larger")],
+)
+def test_the_view_fits_its_screen(width: int, height: int, share: float) -> None:
+    found = shot("view", width, height, 1)
+    assert not found["maximised"]
+    assert found["pixels"] == found["window"]
+    assert found["window"][0] <= width
+    assert found["window"][1] <= height
     assert found["least"][0] <= 640, "it can be made smaller, too"
+    assert found["picture_share"] >= share
+
+
+@pytest.mark.parametrize(("width", "height", "scale"), [(1920, 1080, 1), (3840, 2160, 2)])
+def test_the_view_fills_a_large_screen(width: int, height: int, scale: int) -> None:
+    found = shot("view-maximised", width, height, scale)
+    assert found["maximised"]
+    assert found["pixels"] == [width, height]
+    assert found["window"] == found["screen"] == [width // scale, height // scale]
+    assert found["picture_share"] >= 0.92
