@@ -73,8 +73,13 @@ def test_a_login_that_is_stored_already_is_repeated_whole(tmp_path: Path) -> Non
 
 
 def test_doctor_says_nothing_of_encoders_while_the_preview_is_off() -> None:
-    with serving(GatewayDouble()) as port:
-        assert "encode" not in robotctl("--target", f"127.0.0.1:{port}", "doctor").stdout
+    double = GatewayDouble()
+    double.status.preview.encoder.name = "x264"  # of the last time that it ran
+    with serving(double) as port:
+        shown = robotctl("--target", f"127.0.0.1:{port}", "doctor", "--json").stdout
+    found = json.loads(shown)["findings"]
+    assert "tcp" in {each["check"] for each in found}, "it has looked"
+    assert [each for each in found if "encode" in json.dumps(each)] == []
 
 
 async def test_who_joins_is_shown_by_name_and_on_request_only() -> None:
