@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable
 from datetime import datetime
 from enum import Enum
@@ -12,6 +13,9 @@ import pytest
 import typer
 
 from common.command_line import read_plainly
+
+ROOT = Path(__file__).parents[3]
+PROGRAMS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["scripts"]
 
 
 class Word(Enum):
@@ -83,7 +87,7 @@ def test_anything_else_is_refused(show: Callable[..., str], words: list[str], ex
         show(*words)
 
 
-@pytest.mark.parametrize("program", ["robot-gateway", "robot-preview", "simrobot", "robotctl"])
+@pytest.mark.parametrize("program", PROGRAMS)
 def test_every_program_reports_a_wrong_command_line_in_one_line(program: str) -> None:
     command = {"simrobot": "control", "robotctl": "status"}.get(program, "check")
     for words, problem in (
