@@ -63,3 +63,19 @@ def test_a_stop_takes_less_than_three_seconds(demo: Deployment, service: str) ->
         return demo.time_s(service, "FinishedAt") - asked_s
 
     keeps(3.0, f"s until {service} has stopped", took_s)
+
+
+@pytest.mark.timed
+def test_it_is_healthy_a_minute_after_docker_compose_up(demo: Deployment) -> None:
+    """As docs/deploy.md says of the start."""
+
+    def took_s() -> float:
+        demo.run("stop")
+        began_s = time.monotonic()
+        demo.run("up", "--detach")
+        demo.wait_healthy("gateway", "preview")
+        with demo.client() as robot:
+            demo.wait_for_status(robot)
+        return time.monotonic() - began_s
+
+    keeps(60.0, "s from docker compose up -d to a healthy robot", took_s)
