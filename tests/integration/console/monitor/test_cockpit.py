@@ -21,7 +21,7 @@ from console.presentation.severity_style import SeverityStyle
 from console.robots.robots_file import Robot, RobotsFile
 from console.robots.roster import RobotChoice, Roster
 from console.window import saver
-from console.window.cockpit_keys import cockpit_keys
+from console.window.cockpit_keys import KEYS_OF_THE_HANDS, cockpit_keys
 from console.window.monitor_window import MonitorWindow
 from console.window.programs import monitor
 from omniseer.gateway.v1 import preview_pb2, states_pb2, value_pb2
@@ -33,6 +33,7 @@ from tests.support.cockpit import (
     with_teleop,
     with_trouble,
 )
+from tests.support.documented_keys import documented_keys
 from tests.support.found_robots import FoundRobots
 from tests.support.markup import shown_by_qt
 from tests.support.qt import keep_screenshot, let_pass, press, until
@@ -514,6 +515,14 @@ def test_every_key_of_the_list_is_bound_and_no_key_twice(cockpit: Cockpit) -> No
     bound = [each.key().toString() for each in cockpit.window.findChildren(QShortcut)]
     assert sorted(listed) == sorted(bound)
     assert len(set(listed)) == len(listed)
+
+
+def test_the_page_lists_every_key(cockpit: Cockpit) -> None:
+    listed = {name for key in cockpit_keys(cockpit.window, cockpit.window) for name in key.names}
+    hands = {name for key in KEYS_OF_THE_HANDS for name in key.names}
+    of_qt = {"Tab", "Alt and the underlined letter"}
+    # Those two are in the sentence above the table.
+    assert documented_keys("monitor.md", "Keys") == (listed - {"F1", "?"}) | hands | of_qt
 
 
 def test_cameras_are_chosen_by_key_and_menu(cockpit: Cockpit) -> None:

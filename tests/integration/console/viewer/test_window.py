@@ -17,6 +17,7 @@ from console.viewer.playback import PlaybackState
 from console.viewer.summary import FrameCounter
 from omniseer.gateway.v1 import preview_pb2
 from omniseer.gateway.v1 import states_pb2 as states
+from tests.support.documented_keys import documented_keys
 from tests.support.free import free_tcp_port
 from tests.support.gateway_double import GatewayDouble, StreamingGatewayDouble, serving
 from tests.support.markup import MARKUP, mark_up, no_widget_takes_markup, shown_by_qt
@@ -29,7 +30,7 @@ from tests.support.video_ground import VideoGround, video_ground
 from tests.support.waiting import wait_until
 
 from PySide6.QtCore import Qt  # isort: skip - after Qt's platform was chosen
-from PySide6.QtGui import QColor, QImage  # isort: skip
+from PySide6.QtGui import QColor, QImage, QShortcut  # isort: skip
 from PySide6.QtWidgets import QWidget  # isort: skip
 
 from console.window.programs import viewing
@@ -177,6 +178,12 @@ def test_a_person_turns_full_screen_on_and_off_and_quits(view: ViewWindow) -> No
     assert view.figures.isVisible()
     press(view, Qt.Key.Key_Q)
     assert not view.isVisible()
+
+
+def test_the_page_lists_every_key() -> None:
+    with viewing(f"127.0.0.1:{free_tcp_port()}", None, FrameCounter()) as view:
+        bound = {each.key().toString() for each in view.findChildren(QShortcut)}
+    assert documented_keys("robotctl.md", "Video: robotctl view") == bound
 
 
 def test_an_absent_robot_is_reported(tmp_path: Path) -> None:
