@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 from common.errors import UserError
 from common.findings import Finding, Verdict
 from console.client import Credentials, GatewayClient, NotAllowed
+from gateway.access.credential import Validity
 from gateway.cli import app
 from gateway.doctor.examination import examine
 from tests.support.free import free_tcp_port
@@ -265,6 +266,21 @@ def test_the_command_after_a_new_ca_is_complete(ground: Path) -> None:
     credentials(ground, "init")
     done = gateway(ground, "credentials", "rotate", "ca")
     assert f"robotctl login ROBOT HOST:{port_of(ground)} --ca FILE" in done.stderr
+
+
+def test_the_list_for_programs_has_the_keys_and_states_of_the_page(ground: Path) -> None:
+    credentials(ground, "init")
+    for name in ("anna", "ben"):
+        credentials(ground, "add", name, "--role", "viewer")
+    credentials(ground, "revoke", "anna")
+    listed = json.loads(credentials(ground, "list", "--json"))
+    assert {each["name"]: each["state"] for each in listed} == {"anna": "revoked", "ben": "valid"}
+    assert [each["name"] for each in listed if each["revoked_unix_ms"]] == ["anna"]
+    page = (Path(__file__).parents[4] / "docs/security.md").read_text(encoding="utf-8")
+    keys = page.partition("`list --json` prints for each: ")[2].partition("(null")[0]
+    for each in listed:
+        assert list(each) == re.findall(r"`(\w+)`", keys)
+    assert re.findall(r'"([^"]+)"', keys) == [validity.value for validity in Validity]
 
 
 def test_rights_are_tight_whatever_the_umask_says(ground: Path) -> None:
