@@ -51,6 +51,17 @@ def test_pip_is_that_of_an_environment(document: Path) -> None:
     assert [line for line in lines if re.search(r"(?<![\w./])pip3? install", line)] == []
 
 
+def test_each_image_is_shown_and_taken_by_the_script() -> None:
+    pages = "".join(document.read_text(encoding="utf-8") for document in DOCUMENTS)
+    shown = {Path(link).name for link in re.findall(r"!\[[^\]]+\]\(([^)\s]+)\)", pages)}
+    kept = {image.name for image in (ROOT / "docs/images").iterdir()}
+    assert shown == kept
+    script = (ROOT / "scripts/window-images").read_text(encoding="utf-8")
+    listed = re.findall(r"for name in (.+); do", script)
+    written = re.findall(r"\$images/([\w-]+\.png)", script)
+    assert kept == {*written, *(f"monitor-{name}.png" for names in listed for name in names.split())}
+
+
 def test_the_contributors_guide_names_files_that_exist() -> None:
     guide = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     named = set(
