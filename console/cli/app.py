@@ -36,7 +36,7 @@ COMMANDS: Final[Mapping[str, tuple[str, str]]] = {
     ),
     "monitor": (
         "console.cli.windows:monitor",
-        "Open a window: live video, status, faults, events, plots, preview controls.",
+        "Open a window: live video, status, faults, driving, recordings, preview controls.",
     ),
     "preview": ("console.cli.preview:preview_app", "Turn the live preview on or off."),
     "stop": (
@@ -70,7 +70,7 @@ COMMANDS: Final[Mapping[str, tuple[str, str]]] = {
 # Plain help: Rich, which would draw boxes around it, takes twice as long to import as everything else here.
 _app = typer.Typer(
     name="robotctl",
-    help="Show a robot's status and control its preview.",
+    help="Show a robot's status and video, drive it, and record on it; show a fleet of them.",
     epilog="Exit codes: 0 done, 1 refused or failed, 2 wrong command line, 3 no robot answers.",
     rich_markup_mode=None,
 )
@@ -93,7 +93,7 @@ def _robotctl(
         bool, typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version.")
     ] = False,
 ) -> None:
-    """Show a robot's status and control its preview."""
+    """Show a robot's status and video, drive it, and record on it; show a fleet of them."""
     context.obj = GlobalOptions(target, robot, as_json)
 
 

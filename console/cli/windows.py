@@ -76,7 +76,7 @@ def view(
 ) -> None:
     """Show the live preview with detections overlaid. The robot provides all settings.
 
-    Keys: p preview on or off, o boxes, a age, f full screen, q quit.
+    Keys: p preview on or off, v next camera, o boxes, a age, f full screen, q quit.
     """
     if frames and not headless:
         raise UserError("--frames is for --headless", "Add --headless", exit_code=ExitCode.USAGE)
@@ -103,9 +103,10 @@ def view(
 
 
 def monitor(context: typer.Context, target: TargetOption = None, robot: RobotOption = None) -> None:
-    """Open a window: live video, status, faults, events, plots, preview controls.
+    """Open a window: live video, status, faults, driving, recordings, preview controls.
 
-    Keys: F1 lists all; p preview on or off, 1-3 profile, F9 side panel, f picture only, s save, q quit.
+    Keys: F1 lists all; Space STOP, t drive, p preview on or off, 1-3 profile, F9 side panel, f picture only,
+    q quit.
     """
     open_monitor(lambda: session_of(context, target, robot))
 

@@ -1,5 +1,6 @@
 """The window as a person sees it: what is on the (virtual) screen, read back pixel by pixel."""
 
+import re
 import statistics
 import time
 from collections.abc import Callable, Iterator
@@ -24,6 +25,7 @@ from tests.support.markup import MARKUP, mark_up, no_widget_takes_markup, shown_
 from tests.support.patient import PATIENT
 from tests.support.promise import keeps
 from tests.support.qt import KEPT_IN, application, let_pass, pixel_rows, press, until
+from tests.support.robotctl import robotctl
 from tests.support.running_preview import RunningPreview
 from tests.support.undisturbed import no_stall, undisturbed
 from tests.support.video_ground import VideoGround, video_ground
@@ -180,10 +182,16 @@ def test_a_person_turns_full_screen_on_and_off_and_quits(view: ViewWindow) -> No
     assert not view.isVisible()
 
 
-def test_the_page_lists_every_key() -> None:
+def test_page_and_help_list_every_key() -> None:
     with viewing(f"127.0.0.1:{free_tcp_port()}", None, FrameCounter()) as view:
         bound = {each.key().toString() for each in view.findChildren(QShortcut)}
     assert documented_keys("robotctl.md", "Video: robotctl view") == bound
+    listed = re.search(r"Keys: ([^.]+)\.", " ".join(robotctl("view", "--help").stdout.split()))
+    assert listed
+    # Letters are typed as small ones; two more lead to the full screen and back.
+    assert {each.split()[0] for each in listed[1].split(", ")} == {
+        name.lower() for name in bound - {"F11", "Esc"}
+    }
 
 
 def test_an_absent_robot_is_reported(tmp_path: Path) -> None:
