@@ -150,6 +150,20 @@ def test_the_table_of_credentials_names_every_command_and_option() -> None:
     assert found == {path: its - {"--config", "--directory"} for path, its in leaves(credentials)}
 
 
+def test_the_readme_lists_every_program_with_its_commands() -> None:
+    page = (ROOT / "README.md").read_text(encoding="utf-8")
+    table = page.partition("| command | does |\n|---|---|\n")[2].partition("\n\n")[0]
+    listed: dict[str, set[str]] = {}
+    for row in table.splitlines():
+        name, commands = row.removeprefix("| `").partition("`")[0].split(" ", 1)
+        # Of a group, the commands on their own: preview on.
+        listed[name] = {command.split()[0] for command in commands.split(" \\| ")}
+    assert listed == {
+        name: {word for word, command in program(name).commands.items() if not command.hidden}
+        for name in (*APPS, "robotctl")
+    }
+
+
 @cache
 def text_of(script: str) -> str:
     return (ROOT / PARTS.get(script, script)).read_text(encoding="utf-8")
