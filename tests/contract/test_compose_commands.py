@@ -102,6 +102,22 @@ def test_an_option_that_does_not_exist_is_found() -> None:
         parsed(get_command(hub_app), ["hub", "exporter", "--config", "x"])
 
 
+OF_THE_BUILD = {"ALLOW_STAND_INS", "BUILD_CA", "BUILD_INDEX", "REVISION", "ROS", "VERSION"}
+"""Variables that scripts/images sets, or has options for."""
+OF_TESTS = {"COMPOSE_PROJECT_NAME"}
+
+
+def test_the_example_of_settings_lists_what_the_robots_files_read() -> None:
+    read: set[str] = set()
+    for file in ROOT.glob("compose*.yaml"):
+        if file.name != "compose.demo.yaml":
+            read |= set(re.findall(r"\$\{([A-Z_]+)", file.read_text(encoding="utf-8")))
+    listed = re.findall(r"^#?([A-Z_]+)=", (ROOT / "docker/example.env").read_text("utf-8"), re.MULTILINE)
+    # Those two are compose's own.
+    assert set(listed) - {"COMPOSE_FILE", "COMPOSE_PROFILES"} == read - OF_THE_BUILD - OF_TESTS
+    assert len(listed) == len(set(listed))
+
+
 PAGES = sorted(path.relative_to(ROOT) for path in [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 HISTORY = Path("CHANGELOG.md")
 COMPOSE = re.compile(r"docker compose ([^|;&<>()]*)")
