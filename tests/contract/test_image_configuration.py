@@ -60,8 +60,9 @@ def test_the_variables_name_the_file(tmp_path: Path) -> None:
 def test_check_refuses_a_kind_with_a_type_that_has_no_reader(tmp_path: Path) -> None:
     file = tmp_path / "x.yaml"
     file.write_text(
-        "sources: [{kind: odometry, topic: /odom, type: geometry_msgs/msg/Twist}]", encoding="utf-8"
+        "sources:\n- kind: odometry\n  topic: /odom\n  type: geometry_msgs/msg/Twist\n", encoding="utf-8"
     )
     refused = CliRunner().invoke(gateway_app, ["check", "--config", str(file)])
     assert refused.exit_code != 0
+    assert ", line 4: source 'odometry' (/odom) has type " in str(refused.exception)
     assert "no reader supports" in str(refused.exception)
