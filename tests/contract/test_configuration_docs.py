@@ -68,6 +68,13 @@ def test_the_page_lists_exactly_the_keys(settings: type[BaseModel], heading: str
     assert documented == {key.replace("cameras.", "source.") for key in keys}
 
 
+def test_the_schema_is_named_as_an_editor_finds_it() -> None:
+    """The YAML language server takes a path that is not absolute from the file's folder, `~` included."""
+    written = re.findall(r"check --schema > (\S+)", PAGE)
+    named = re.findall(r"# yaml-language-server: \$schema=(\S+)", PAGE)
+    assert written == named == ["gateway.schema.json"]
+
+
 def test_the_page_of_uploads_lists_exactly_the_keys_of_the_receiver() -> None:
     page = (ROOT / "docs/uploads.md").read_text(encoding="utf-8")
     table = page.partition("| key | default | meaning |\n|---|---|---|\n")[2].partition("\n\n")[0]
