@@ -1,6 +1,10 @@
-"""A whole robot in containers, brought to a release made by scripts/release, and back."""
+"""A whole robot in containers, brought to a release made by scripts/release, and back.
+
+Once it is a robot of this tree, and once one of version 0.1.0, whose images are built from its commit.
+"""
 
 import json
+import os
 import shutil
 import subprocess
 from collections.abc import Iterator
@@ -10,14 +14,22 @@ import pytest
 
 from console.client.blocking import GatewayClient
 from console.client.errors import GatewayError
+from console.client.results import PreviewState
+from console.credentials import Credentials
+from console.robots.login import parse_login
 from tests.support.engine import ROOT, TAG
 from tests.support.free import free_domain, free_tcp_port, free_udp_port
+from tests.support.patient import PATIENT
 from tests.support.release import VERSION, release, released_repository
 from tests.support.waiting import wait_until
 
 pytestmark = [pytest.mark.on_request, pytest.mark.docker, pytest.mark.timeout(1500)]
 
 IMAGES = ("robot-gateway", "robot-preview", "robot-drive", "robot-recorder", "robot-bridge")
+EARLIER = "0.1.0"
+EARLIER_COMMIT = "badc0ba97b4cba1539f9ab04e308ae2d04d82a24"
+EARLIER_TAG = f"e2e-{EARLIER}"
+AUDIT = "/var/lib/robot-gateway/audit/audit.jsonl"
 
 
 @pytest.fixture(scope="module")
@@ -68,14 +80,60 @@ def robot(tmp_path: Path, images: str) -> Iterator[tuple[Path, int]]:  # noqa: A
             compose(directory, "down", "--volumes", "--timeout", "5")
 
 
-def compose(directory: Path, *words: str) -> None:
-    subprocess.run(
+@pytest.fixture
+def earlier_robot(tmp_path: Path) -> Iterator[tuple[Path, int]]:
+    """The same of version 0.1.0, built from its commit; callers need credentials, and it is not started."""
+    found = subprocess.run(
+        ["git", "cat-file", "-e", f"{EARLIER_COMMIT}^{{commit}}"], cwd=ROOT, capture_output=True, check=False
+    )
+    if found.returncode != 0:
+        pytest.skip(f"this repository lacks the commit of {EARLIER}. Type: git fetch --unshallow")
+    directory = tmp_path / "robot"
+    directory.mkdir()
+    archive = tmp_path / "archive.tar"
+    subprocess.run(["git", "archive", "--output", archive, EARLIER_COMMIT], cwd=ROOT, check=True)
+    subprocess.run(["tar", "-xf", archive, "-C", directory], check=True)
+    built = subprocess.run(
+        [directory / "scripts/images", "build", "--ros", "wheels"],
+        env={**os.environ, "TAG": EARLIER_TAG, "COMPOSE_FILE": "compose.yaml"},
+        capture_output=True,
+        text=True,
+        timeout=1200,
+        check=False,
+    )
+    assert built.returncode == 0, built.stderr[-3000:]
+    config = directory / "docker/config/gateway.yaml"
+    config.write_text(config.read_text().replace("name: robot-gateway", "name: lab7"))
+    port = free_tcp_port()
+    with free_domain() as domain:
+        settings = {
+            "COMPOSE_PROJECT_NAME": f"robot-upgrade-e2e-{port}",
+            "COMPOSE_FILE": "compose.yaml:compose.demo.yaml:compose.guarded.yaml",
+            "ROS_DOMAIN_ID": str(domain),
+            "GATEWAY_PORT": str(port),
+            "PREVIEW_PORT": str(free_udp_port()),
+            "TAG": EARLIER_TAG,
+        }
+        (directory / ".env").write_text("".join(f"{name}={value}\n" for name, value in settings.items()))
+        try:
+            yield directory, port
+        finally:
+            compose(directory, "down", "--volumes", "--timeout", "5")
+            tags = (EARLIER_TAG, f"before-{VERSION}")
+            names = [f"{image}:{tag}" for image in IMAGES[:2] for tag in tags]
+            subprocess.run(["docker", "image", "rm", "--force", *names], capture_output=True, check=False)
+
+
+def compose(directory: Path, *words: str) -> str:
+    """Returns what a `docker compose` command prints."""
+    return subprocess.run(
         ["docker", "compose", "--progress", "quiet", *words],
-        cwd=directory, capture_output=True, timeout=180, check=True,
-    )  # fmt: skip
+        cwd=directory, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=180, check=True,
+    ).stdout  # fmt: skip
 
 
 def upgrade(directory: Path, *words: str | Path) -> None:
+    """Runs scripts/upgrade-robot of a tree."""
     ended = subprocess.run(
         [directory / "scripts/upgrade-robot", *words],
         cwd="/", capture_output=True, text=True, timeout=400, check=False,
@@ -115,6 +173,59 @@ def test_a_robot_is_upgraded_and_taken_back_with_its_recordings_and_its_name(
     assert seen(port) == ("lab7", VERSION, [kept])
     upgrade(directory, "--rollback")
     assert seen(port) == ("lab7", old, [kept])
+
+
+def plays(port: int, anna: Credentials) -> tuple[str, str]:
+    """The robot's name and version, as soon as anna may call and the preview runs for her; then it is off."""
+
+    def asked() -> tuple[str, str] | None:
+        try:
+            with GatewayClient(f"127.0.0.1:{port}", PATIENT, anna) as client:
+                status = client.status()
+                if not (status.health.ready and status.preview.service_reachable):
+                    return None
+                if client.enable_preview().preview.state is not PreviewState.RUNNING:
+                    return None
+                client.disable_preview()
+                return status.gateway_name, status.gateway_version
+        except GatewayError:
+            return None
+
+    return wait_until(asked, "the robot answers anna, and its preview runs", 60)
+
+
+def audited(directory: Path) -> list[str]:
+    return compose(directory, "exec", "-T", "gateway", "cat", AUDIT).splitlines()
+
+
+def test_a_robot_of_0_1_0_is_upgraded_and_taken_back_with_its_credentials(
+    made: Path, earlier_robot: tuple[Path, int], tmp_path: Path
+) -> None:
+    """By the script of the release: that version had none."""
+    directory, port = earlier_robot
+    compose(directory, "run", "--rm", "-T", "credentials", "init")
+    login = compose(directory, "run", "--rm", "-T", "credentials", "add", "anna", "--role", "operator")
+    anna = parse_login(login).credentials
+    compose(directory, "up", "--detach")
+    assert plays(port, anna) == ("lab7", EARLIER)
+    before = audited(directory)
+    assert before
+
+    tree = tmp_path / "tree"
+    tree.mkdir()
+    archive = made / f"robot-gateway-{VERSION}.tar.gz"
+    subprocess.run(["tar", "-xf", archive, "-C", tree, "--strip-components=1"], check=True)
+    upgrade(tree, "--robot", directory, made)
+    assert plays(port, anna) == ("lab7", VERSION)
+    during = audited(directory)
+    assert during[: len(before)] == before
+    assert len(during) > len(before)
+
+    upgrade(tree, "--robot", directory, "--rollback")
+    assert plays(port, anna) == ("lab7", EARLIER)
+    assert audited(directory)[: len(during)] == during
+    upgrade(tree, "--robot", directory, "--rollback")
+    assert plays(port, anna) == ("lab7", VERSION)
 
 
 def test_the_images_are_named_with_their_digests(made: Path) -> None:
