@@ -9,9 +9,20 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from release_program.sums import write_sums
 
 from tests.support.bare_robot import bare_robot
-from tests.support.release import ROOT, VERSION, alone, clone, commit, git, release, released_repository
+from tests.support.release import (
+    ROOT,
+    VERSION,
+    alone,
+    clone,
+    commit,
+    git,
+    raise_version,
+    release,
+    released_repository,
+)
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -269,6 +280,87 @@ def test_a_robot_without_docker_is_installed_without_network(
         for program in ("gateway", "preview", "drive", "recorder", "bridge", "tap"):
             robot.output(f"robot-{program}", "check")
         assert robot.run(script, "--release", made).stderr == "install-robot: up to date\n"
+
+
+LATER = "9.9.0"
+LEFT = {
+    "/etc/robot-gateway/gateway.yaml": "name: lab7\n",
+    "/etc/robot-gateway/robot.env": "ROS_DOMAIN_ID=7\n",
+    "/var/lib/robot-gateway/credentials/principals.json": "who may call",
+    "/var/lib/robot-gateway/audit/audit.jsonl": "what was done",
+    "/var/lib/robot-drive/stop": "a stop",
+    "/var/lib/robot-recorder/a/data/000000.mcap": "what was recorded",
+    "/var/lib/robot-bridge/outbox": "what waits for the hub",
+}
+"""What is the robot's own, whatever version runs."""
+
+
+def of_the_next_version(made: Path, target: Path) -> tuple[Path, Path]:
+    """Returns the tree and the release of a later version, which needs the same wheels."""
+    tree, later = target / "tree", target / "release"
+    tree.mkdir()
+    archive = made / f"robot-gateway-{VERSION}.tar.gz"
+    subprocess.run(["tar", "-xf", archive, "-C", tree, "--strip-components=1"], check=True, timeout=60)
+    raise_version(tree, LATER)
+    shutil.copytree(made / "robot", later / "robot", copy_function=os.link)
+    (later / "RELEASE").write_text((made / "RELEASE").read_text().replace(VERSION, LATER))
+    write_sums(later)
+    return tree, later
+
+
+def test_a_robot_without_docker_is_upgraded_and_taken_back(made: Path, tmp_path: Path) -> None:
+    """By two commands, without network, with everything kept that is the robot's own."""
+    archive = made / f"robot-gateway-{VERSION}.tar.gz"
+    subprocess.run(["tar", "-xf", archive, "-C", tmp_path], check=True, timeout=60)
+    first = tmp_path / f"robot-gateway-{VERSION}/scripts/install-robot"
+    (tmp_path / "next").mkdir()
+    tree, later = of_the_next_version(made, tmp_path / "next")
+    script = tree / "scripts/install-robot"
+    (tmp_path / "robot").mkdir()
+    with bare_robot(tmp_path / "robot") as robot:
+
+        def in_use() -> tuple[str, str]:
+            """The release in use, and the version of its programs."""
+            release = robot.output("readlink", "-e", "/opt/robot-gateway/current").strip()
+            ask = "from common.version import project_version; print(project_version())"
+            return release, robot.output(f"{release}/bin/python", "-c", ask).strip()
+
+        def done(*command: str | Path) -> None:
+            ended = robot.run(*command)
+            assert ended.returncode == 0, ended.stderr
+
+        robot.boot()
+        done(first, "--release", made)
+        old, version = in_use()
+        assert version == VERSION
+        assert robot.started() == [("robot-gateway", old), ("robot-preview", old)]
+        for path, text in LEFT.items():
+            robot.output("mkdir", "-p", Path(path).parent)
+            robot.write(path, text)
+        # Enabled by hand; and one that someone has stopped.
+        robot.write("/run/active", "robot-gateway\nrobot-drive\n")
+
+        done(script, "--release", later)
+        new, version = in_use()
+        assert version == LATER
+        assert robot.started() == [("robot-gateway", new), ("robot-drive", new)]
+        done(script, "--rollback")
+        assert in_use() == (old, VERSION)
+        assert robot.started() == [("robot-gateway", old), ("robot-drive", old)]
+        done(script, "--rollback")
+        assert in_use() == (new, LATER)
+        assert robot.started() == [("robot-gateway", new), ("robot-drive", new)]
+        assert {path: robot.output("cat", path) for path in LEFT} == LEFT
+
+        # A setting that the version does not know: what runs, runs on.
+        robot.write("/etc/robot-gateway/gateway.yaml", "name: lab7\nno_such_key: 1\n")
+        for options in (["--rollback"], ["--release", later]):
+            refused = robot.run(script, *options)
+            assert refused.returncode == 1
+            assert "gateway.yaml, line 2: unknown key 'no_such_key'" in refused.stderr
+            assert "what ran before, runs on" in refused.stderr
+            assert in_use() == (new, LATER)
+            assert robot.started() == []
 
 
 def test_robots_of_each_python_and_processor_have_their_wheels(made: Path) -> None:
