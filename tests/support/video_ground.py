@@ -84,6 +84,7 @@ def video_ground(
     preview: Mapping[str, Any] | None = None,
     gateway: Mapping[str, Any] | None = None,
     *,
+    cameras: Mapping[str, Any] | None = None,
     small: bool = True,
 ) -> Iterator[VideoGround]:
     """Up when the block begins; nothing is left when it ends.
@@ -92,9 +93,10 @@ def video_ground(
         directory: for everything both programs write.
         preview: keys of its configuration.
         gateway: keys of its configuration.
+        cameras: devices to pretend, as of `RunningPreview`.
         small: frames of 320x240 instead of 1280x720.
     """
-    with RunningPreview(directory, preview, small=small) as service:
+    with RunningPreview(directory, preview, cameras=cameras, small=small) as service:
         settings = {"sources": [], **(gateway or {})}
         settings["preview"] = {"socket": str(service.socket), **settings.get("preview", {})}
         ground = VideoGround(service, RestartableGateway(directory, settings))

@@ -1,9 +1,7 @@
 """What each overlay adds up to, as compose itself resolves it. Needs compose, no engine's work."""
 
 import json
-import re
 import subprocess
-import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +9,7 @@ import pytest
 import yaml
 
 from common import ros_transport
+from tests.support.documented_configuration import THREE_CAMERAS, documented
 from tests.support.engine import ROOT
 
 pytestmark = pytest.mark.docker
@@ -229,26 +228,16 @@ def test_a_camera_has_its_own_name_in_the_container(
     assert preview["environment"]["PREVIEW__SOURCE__DEVICE"] == camera
 
 
-def documented(key: str, section: str) -> str:
-    """The block of docs/configuration.md, in a section, that begins with a key."""
-    page = (ROOT / "docs/configuration.md").read_text(encoding="utf-8")
-    text = page.partition(f"\n### {section}\n")[2].partition("\n## ")[0]
-    blocks = re.findall(r"^ *```yaml\n(.*?)^ *```", text, re.MULTILINE | re.DOTALL)
-    (found,) = [block for each in blocks if (block := textwrap.dedent(each)).startswith(f"{key}:\n")]
-    return found
-
-
 @pytest.mark.parametrize(
     "overlays", [(), ("vaapi",), ("rockchip",)], ids=lambda names: "+".join(names) or "none"
 )
 def test_the_documented_overlay_passes_in_the_documented_cameras(
     overlays: tuple[str, ...], tmp_path: Path
 ) -> None:
-    section = "Two USB cameras and a ROS topic"
-    cameras = yaml.safe_load(documented("cameras", section))["cameras"].values()
+    cameras = yaml.safe_load(documented("cameras", THREE_CAMERAS))["cameras"].values()
     wanted = [camera["device"] for camera in cameras if camera["kind"] == "v4l2"]
     assert len(wanted) == 2
-    overlay = yaml.safe_load(documented("services", section))
+    overlay = yaml.safe_load(documented("services", THREE_CAMERAS))
     if "rockchip" in overlays:
         # As the page says.
         del overlay["services"]["preview"]["group_add"]
