@@ -23,7 +23,7 @@ esac
 
 @pytest.fixture
 def robot(tmp_path: Path) -> Path:
-    """The directory of a robot that runs 9.1.0, and 1.0.0 before it."""
+    """The directory of a robot that runs 9.1.0, and before it 1.0.0, which has no scripts/upgrade-robot."""
     directory = tmp_path / "robot"
     before = directory / ".upgrade/trees/1.0.0"
     before.mkdir(parents=True)
@@ -31,11 +31,15 @@ def robot(tmp_path: Path) -> Path:
     (directory / ".upgrade/previous").write_text("1.0.0\n")
     (directory / "compose.yaml").write_text("# 9.1.0\n")
     (before / "compose.yaml").write_text("# 1.0.0\n")
+    for scripts in (directory / "scripts", before / "scripts"):
+        scripts.mkdir()
+    (directory / "scripts/upgrade-robot").touch()
     return directory
 
 
-def test_what_compose_asks_gets_no_answer_from_the_callers_input(robot: Path, tmp_path: Path) -> None:
-    """The defect: at a terminal an upgrade from 0.1.0 stopped, and waited for a word on a volume."""
+@pytest.fixture
+def back(robot: Path, tmp_path: Path) -> "subprocess.CompletedProcess[str]":
+    """A rollback that has ended well; its input says yes to everything."""
     docker = tmp_path / "bin/docker"
     docker.parent.mkdir()
     docker.write_text(DOCKER)
@@ -51,6 +55,12 @@ def test_what_compose_asks_gets_no_answer_from_the_callers_input(robot: Path, tm
         check=False,
     )
     assert ended.returncode == 0, ended.stderr
+    return ended
+
+
+@pytest.mark.usefixtures("back")
+def test_what_compose_asks_gets_no_answer_from_the_callers_input(robot: Path, tmp_path: Path) -> None:
+    """The defect: at a terminal an upgrade from 0.1.0 stopped, and waited for a word on a volume."""
     assert (robot / ".env").read_text() == "OWN=1\nTAG=1.0.0\n"
     assert (robot / "compose.yaml").read_text() == "# 1.0.0\n"
     commands = (tmp_path / "commands").read_text().splitlines()
@@ -58,3 +68,13 @@ def test_what_compose_asks_gets_no_answer_from_the_callers_input(robot: Path, tm
     starts = [line for line in commands if line.endswith(" up --detach gateway")]
     assert (len(checks), len(starts)) == (1, 1)
     assert (tmp_path / "read").read_text() == ""
+
+
+def test_the_way_forth_from_a_version_without_the_script_is_named(
+    robot: Path, back: "subprocess.CompletedProcess[str]"
+) -> None:
+    """The defect: it named scripts/upgrade-robot, which was gone."""
+    assert not (robot / "scripts/upgrade-robot").exists()
+    script = robot / ".upgrade/trees/9.1.0/scripts/upgrade-robot"
+    assert script.exists()
+    assert back.stderr.rstrip().endswith(f"Forth to 9.1.0: {script} --robot {robot} --rollback")
