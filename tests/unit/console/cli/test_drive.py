@@ -46,7 +46,8 @@ class Robot:
         pass
 
     def reasons(self) -> str:
-        return f"stop {self.state.stop.stop_id}"
+        stop = self.state.stop
+        return f"stop {stop.stop_id}" if stop else ""
 
     def release(self) -> None:
         pass
