@@ -34,7 +34,9 @@ pytestmark = pytest.mark.gst
 FRAME_MS = 1000 / 30
 _CPU_WINDOW_S = 2.0
 _CPU_TURNS = 15
-"""So many that the median is not moved by a disturbed window: one alone strays by 0.09 on an idle machine."""
+"""At most: so many that the median is not moved by a disturbed window. One alone strays by 0.09 on an idle
+machine."""
+_CPU_RATIO = 1.1
 LISTENING = pb.LIFECYCLE_STATE_RUNNING
 OFF = pb.LIFECYCLE_STATE_DISABLED
 TYPES = get_typestore(Stores.ROS2_JAZZY)
@@ -340,8 +342,8 @@ def test_the_tap_adds_a_tenth_of_the_previews_cpu_time_at_most(tmp_path: Path) -
             watcher.wait_for_frames(30)
 
             def ratio() -> float:
-                ratios = []
-                for _ in range(_CPU_TURNS):
+                ratios = list[float]()
+                while not is_decided(ratios):
                     without = cpu_share(preview.process.pid, _CPU_WINDOW_S).whole
                     with TapRecording(preview.tap) as recording:
                         recording.wait_for_frames(5)
@@ -349,4 +351,10 @@ def test_the_tap_adds_a_tenth_of_the_previews_cpu_time_at_most(tmp_path: Path) -
                 print(f"CPU with the tap against without: {ratios}")
                 return statistics.median(ratios)
 
-            keeps(1.1, "CPU time with the tap against without", ratio, per_stalled_s=None)
+            keeps(_CPU_RATIO, "CPU time with the tap against without", ratio, per_stalled_s=None)
+
+
+def is_decided(ratios: list[float]) -> bool:
+    """Whether the median of all turns is within the promise, or beyond it, whatever the further ones show."""
+    within = sum(each <= _CPU_RATIO for each in ratios)
+    return max(within, len(ratios) - within) > _CPU_TURNS / 2
