@@ -19,16 +19,23 @@ from tests.support.waiting import wait_until
 
 pytestmark = [pytest.mark.ros, pytest.mark.timed]
 
+TOPIC = "/stop_button"
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 VOLATILE = QoSProfile(depth=1)
 
 
+@pytest.fixture(scope="module")
+def robot(
+    module_ros_domain: int,  # noqa: ARG001  # for its effect
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator[Driving]:
+    """One with a stop of its own, which is pressed between two tests."""
+    with driving(tmp_path_factory.mktemp("drive"), stop_topics=[TOPIC]) as made:
+        yield made
+
+
 @pytest.mark.parametrize("qos", [LATCHED, VOLATILE], ids=["latched", "volatile"])
-def test_it_is_pressed_until_a_live_publisher_says_otherwise(
-    tmp_path: Path,
-    ros_domain: int,  # noqa: ARG001  # for its effect
-    qos: Any,
-) -> None:
+def test_it_is_pressed_until_a_live_publisher_says_otherwise(robot: Driving, qos: Any) -> None:
     boolean = message_class("std_msgs/msg/Bool")
 
     def attempt() -> None:
@@ -39,7 +46,7 @@ def test_it_is_pressed_until_a_live_publisher_says_otherwise(
             robot.phase_is("INHIBITED")
             wait_until(lambda: list(robot.state().inhibits) == [pb.INHIBIT_ROBOT_STOP], "the one reason")
             with ros_node("button") as button:
-                publisher = button.create_publisher(boolean, "/stop_button", qos)
+                publisher = button.create_publisher(boolean, TOPIC, qos)
                 if qos is VOLATILE:
                     wait_until(lambda: publisher.get_subscription_count() >= 2, "its subscribers")
                 publisher.publish(boolean(data=False))
@@ -54,8 +61,7 @@ def test_it_is_pressed_until_a_live_publisher_says_otherwise(
             robot.phase_is("INHIBITED")
             wait_until(lambda: list(robot.state().inhibits) == [pb.INHIBIT_ROBOT_STOP], "the button has gone")
 
-    with driving(tmp_path, stop_topics=["/stop_button"]) as robot:
-        undisturbed(attempt)
+    undisturbed(attempt)
 
 
 @contextmanager
@@ -68,15 +74,15 @@ def leased(robot: Driving) -> Iterator[None]:
         yield
 
 
-def test_what_one_publisher_has_pressed_no_other_releases(tmp_path: Path, ros_domain: int) -> None:  # noqa: ARG001
+def test_what_one_publisher_has_pressed_no_other_releases(robot: Driving) -> None:
     boolean = message_class("std_msgs/msg/Bool")
 
     def attempt() -> None:
         with leased(robot), ros_node("button") as button, ros_node("other") as other:
-            pressing = button.create_publisher(boolean, "/stop_button", LATCHED)
+            pressing = button.create_publisher(boolean, TOPIC, LATCHED)
             pressing.publish(boolean(data=False))
             robot.phase_is("ARMED")
-            releasing = other.create_publisher(boolean, "/stop_button", LATCHED)
+            releasing = other.create_publisher(boolean, TOPIC, LATCHED)
             wait_until(lambda: "2 publishers" in " ".join(robot.state().problems), "both are seen")
             pressing.publish(boolean(data=True))
             releasing.publish(boolean(data=False))
@@ -88,16 +94,15 @@ def test_what_one_publisher_has_pressed_no_other_releases(tmp_path: Path, ros_do
             robot.phase_is("ARMED")
             assert not robot.state().problems
 
-    with driving(tmp_path, stop_topics=["/stop_button"]) as robot:
-        undisturbed(attempt)
+    undisturbed(attempt)
 
 
-def test_a_press_that_is_released_at_once_counts(tmp_path: Path, ros_domain: int) -> None:  # noqa: ARG001
+def test_a_press_that_is_released_at_once_counts(robot: Driving) -> None:
     boolean = message_class("std_msgs/msg/Bool")
-    with driving(tmp_path, stop_topics=["/stop_button"]) as robot, ros_node("button") as button:
+    with ros_node("button") as button:
         # Latched, for a worker that takes the place of a lost one.
         qos = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        publisher = button.create_publisher(boolean, "/stop_button", qos)
+        publisher = button.create_publisher(boolean, TOPIC, qos)
         publisher.publish(boolean(data=False))
 
         def attempt() -> None:
@@ -119,14 +124,14 @@ def test_a_publisher_that_is_silent_counts_as_pressed_where_that_is_configured(
 ) -> None:
 
     def attempt() -> None:
-        with helper("tests.support.stop_button", "/stop_button") as button:
-            robot.drive()
-            with robot.moving():
+        with helper("tests.support.stop_button", TOPIC) as button:
+            impatient.drive()
+            with impatient.moving():
                 button.send_signal(number)
                 began_ns = time.monotonic_ns()
-                assert pb.INHIBIT_ROBOT_STOP in robot.inhibited().inhibits
-                robot.settled()
-                assert robot.witness.zero_after_ms(began_ns) < 1000
+                assert pb.INHIBIT_ROBOT_STOP in impatient.inhibited().inhibits
+                impatient.settled()
+                assert impatient.witness.zero_after_ms(began_ns) < 1000
 
-    with driving(tmp_path, stop_topics=["/stop_button"], stop_timeout_ms=500) as robot:
+    with driving(tmp_path, stop_topics=[TOPIC], stop_timeout_ms=500) as impatient:
         undisturbed(attempt)
