@@ -67,6 +67,9 @@ COPY --from=whole /small /
 """
 """Only what the services run: a whole system takes seconds to be saved, verified and loaded, in each test."""
 
+NOT_HEALTHY_S = 10
+"""After which a version counts as not healthy. The one before, which starts then, has as long."""
+
 
 class Robot:
     """A robot's directory with a running project, and releases for it."""
@@ -322,7 +325,7 @@ def test_a_service_that_the_release_does_not_have_is_removed(robot: Robot) -> No
 
 def test_it_runs_again_where_the_release_does_not_become_healthy(robot: Robot) -> None:
     with_more_services(robot)
-    failed = robot.upgrade(robot.release("9.1.0", healthy=False), within_s=20)
+    failed = robot.upgrade(robot.release("9.1.0", healthy=False), within_s=NOT_HEALTHY_S)
     assert "1.0.0 is in use again, as before" in failed.stderr
     assert robot.services() == {"gateway", "dropped", "own"}
 
@@ -345,7 +348,7 @@ def test_only_what_runs_and_the_way_back_take_room(robot: Robot) -> None:
 def test_a_release_that_does_not_become_healthy_is_left_by_itself(robot: Robot) -> None:
     robot.begin()
     before = robot.snapshot()
-    failed = robot.upgrade(robot.release("9.1.0", healthy=False), within_s=20)
+    failed = robot.upgrade(robot.release("9.1.0", healthy=False), within_s=NOT_HEALTHY_S)
     assert failed.returncode == 1
     assert "9.1.0 does not become healthy: going back to 1.0.0" in failed.stderr
     assert "1.0.0 is in use again, as before" in failed.stderr
@@ -426,7 +429,7 @@ def test_an_upgrade_that_was_killed_is_finished_by_the_next_command(robot: Robot
         os.killpg(program.pid, signal.SIGKILL)
         program.wait(10)
     assert marker.read_text() == "9.1.0 1.0.0\n"
-    finished = robot.upgrade("--rollback", within_s=20)
+    finished = robot.upgrade("--rollback", within_s=NOT_HEALTHY_S)
     assert "a change from 1.0.0 to 9.1.0 was interrupted: finishing it" in finished.stderr
     assert "1.0.0 is in use again" in finished.stderr
     assert robot.running() == "1.0.0"
