@@ -84,7 +84,10 @@ def other_python(version: str) -> str:
 
 
 def test_two_releases_of_a_commit_are_the_same_bytes(made: Path, repository: Path, tmp_path: Path) -> None:
-    """From another clone, at another path, hour and place, and with another umask."""
+    """From another clone, at another path, hour and place, and with another umask.
+
+    The second one lacks the other projects' wheels for newer Pythons, whose bytes the lock file decides.
+    """
     output = tmp_path / "second"
     before = os.umask(0o077)
     try:
@@ -92,6 +95,8 @@ def test_two_releases_of_a_commit_are_the_same_bytes(made: Path, repository: Pat
         ended = release(
             other,
             "--without-images",
+            "--python",
+            PYTHON,
             "--output",
             output,
             environment={"TZ": "Asia/Tokyo", "LC_ALL": "C"},
@@ -99,8 +104,11 @@ def test_two_releases_of_a_commit_are_the_same_bytes(made: Path, repository: Pat
     finally:
         os.umask(before)
     assert ended.returncode == 0, ended.stderr
-    assert sums(output) == sums(made)
-    assert len(sums(made)) > 25
+    first, second = sums(made), sums(output)
+    assert second.items() <= first.items()
+    lacking = first.keys() - second.keys()
+    assert not [path for path in lacking if not path.endswith(".whl") or "robot_gateway" in path]
+    assert len(second) > 25
 
 
 def test_every_file_is_in_the_sums(made: Path) -> None:
