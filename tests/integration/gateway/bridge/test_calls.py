@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import grpc
+import pytest
 
 from common.reasons import Reason
 from console.client import AsyncGatewayClient, CloudState, GatewayClient, RecordingCopyState
@@ -205,7 +206,10 @@ async def test_what_a_user_types_and_reads(tmp_path: Path) -> None:
         assert "robotctl" in only_line(missing.stderr)
 
 
-async def test_waiting_ends_when_the_copy_is_cancelled(tmp_path: Path) -> None:
+async def test_waiting_ends_when_the_copy_is_cancelled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("console.client.uploading._UNSEEN", 3)  # Statuses, of which there is one a second.
     async with fleet_robot(tmp_path) as robot:
         robot.recorder.add({"a": b"1"}, id="one")
         async with AsyncGatewayClient(f"127.0.0.1:{robot.port}") as client:
