@@ -28,6 +28,8 @@ _SITUATIONS: Final = (
 _FRAMES: Final = 5
 _HISTORY_S: Final = 4.0
 """Until the trail is visible, and the plots have a curve."""
+_WITH_HISTORY: Final = frozenset({"cockpit", "trouble", "dark"})
+"""Situations that are shown with them: what is seen of the others is there at once."""
 
 
 def _choose_screen(width: int, height: int, scale: int, directory: Path) -> None:
@@ -77,7 +79,8 @@ def _cockpit(situation: str, directory: Path, file: Path) -> Mapping[str, Any]:
 
     with seeing_robot(directory) as robot, monitor(robot.target) as window, _frames(window.video) as frames:
         until(lambda: frames() >= _FRAMES, "the picture")
-        let_pass(_HISTORY_S)
+        if situation in _WITH_HISTORY:
+            let_pass(_HISTORY_S)
         if situation == "trouble":
             with_trouble(robot.gateway)
         if situation in ("trouble", "driving", "tiles-driving"):
