@@ -436,22 +436,22 @@ def test_an_upgrade_that_was_killed_is_finished_by_the_next_command(robot: Robot
     assert not marker.exists()
 
 
-@pytest.mark.parametrize("name", ["compose.yaml", "docker", ".dockerignore"])
-def test_an_upgrade_that_was_killed_between_two_renames_is_finished(robot: Robot, name: str) -> None:
+def test_an_upgrade_that_was_killed_between_two_renames_is_finished(robot: Robot) -> None:
     """The directory has then no such file: neither the old one nor the new one."""
     robot.begin()
     assert robot.upgrade(robot.release("9.1.0")).returncode == 0
     own = robot.snapshot()
-    (robot.directory / ".upgrade/switching").write_text("1.0.0 9.1.0\n")
-    aside = robot.directory / ".upgrade/trees/9.1.0"
-    aside.mkdir()
-    (robot.directory / name).rename(aside / name)
-    finished = robot.upgrade("--rollback")
-    assert "a change from 9.1.0 to 1.0.0 was interrupted: finishing it" in finished.stderr
-    # The rollback that was asked for leads forth again.
-    assert finished.returncode == 0, finished.stderr
-    assert robot.running() == "9.1.0"
-    assert robot.snapshot() == own
+    for name in ("compose.yaml", "docker", ".dockerignore"):
+        (robot.directory / ".upgrade/switching").write_text("1.0.0 9.1.0\n")
+        aside = robot.directory / ".upgrade/trees/9.1.0"
+        aside.mkdir()
+        (robot.directory / name).rename(aside / name)
+        finished = robot.upgrade("--rollback")
+        assert "a change from 9.1.0 to 1.0.0 was interrupted: finishing it" in finished.stderr, name
+        # The rollback that was asked for leads forth again.
+        assert finished.returncode == 0, f"{name}: {finished.stderr}"
+        assert robot.running() == "9.1.0", name
+        assert robot.snapshot() == own, name
 
 
 def test_an_upgrade_that_was_killed_before_it_said_what_it_changes_is_no_obstacle(robot: Robot) -> None:
