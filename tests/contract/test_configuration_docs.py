@@ -107,7 +107,7 @@ def refusals(file: Path, keys: set[str]) -> list[str]:
     return said or [f"no program has all of {sorted(keys)}"]
 
 
-@pytest.mark.parametrize("example", files())
+@pytest.mark.parametrize("example", list(files()))
 def test_a_program_takes_the_example(example: str, tmp_path: Path) -> None:
     file = tmp_path / "example.yaml"
     file.write_text(example, encoding="utf-8")
@@ -139,7 +139,7 @@ def sections() -> Iterator[Any]:
                 yield pytest.param(span, id=f"{page.name}-{span}")
 
 
-@pytest.mark.parametrize("section", sections())
+@pytest.mark.parametrize("section", list(sections()))
 def test_a_program_has_the_keys_of_a_section_in_the_text(section: str) -> None:
     named = set(paths_of(yaml.safe_load(section)))
     assert any(named <= set(keys_of(settings)) for settings in PROGRAMS), named
@@ -156,7 +156,7 @@ def examples_of_cameras() -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("example", examples_of_cameras())
+@pytest.mark.parametrize("example", list(examples_of_cameras()))
 def test_the_examples_of_cameras_are_accepted_and_printed_as_they_are(example: str, tmp_path: Path) -> None:
     file, printed = tmp_path / "preview.yaml", tmp_path / "printed.yaml"
     file.write_text(example, encoding="utf-8")
