@@ -57,7 +57,7 @@ class OtherSources:
         self._inputs: dict[str, _Input] = {}
         self._found: dict[str, str] = {}
         self._guessed = True
-        """Whether a node without a known output counted as the multiplexer when they were found."""
+        """Whether a node that is not known to publish for the base counted as the multiplexer."""
         self._looked_ns = self._taken_ns = 0
         self._commanding: tuple[str, ...] = ()
 
@@ -90,36 +90,37 @@ class OtherSources:
         return self._commanding
 
     def _look(self) -> None:
-        self._guessed = False
         try:
-            found = dict(self._other_inputs())
+            multiplexers, guessed = self._multiplexers()
+            found = dict(self._other_inputs(multiplexers))
         except (RuntimeError, UnicodeError) as error:
             # A node that has just gone, or a name that is no text.
             _log.debug("the inputs of the multiplexer can't be listed: %s", error)
-            self._guessed = True
             return
-        if found:  # A multiplexer that is started again has the inputs that it had.
-            self._found = found
+        # A multiplexer that is started again has the inputs that it had; a guess adds to what was known.
+        if guessed and not self._guessed:
+            self._found |= found
+        elif found:
+            self._found, self._guessed = found, guessed
 
-    def _other_inputs(self) -> Iterator[tuple[str, str]]:
-        """Yields topic and type of each velocity that the multiplexer takes beside ours."""
-        for name, namespace in set().union(*map(self._multiplexers, self._outputs)):
+    def _other_inputs(self, multiplexers: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
+        """Yields topic and type of each velocity that these nodes take beside ours."""
+        for name, namespace in multiplexers:
             for topic, types in self._node.get_subscriber_names_and_types_by_node(name, namespace):
                 if topic not in self._ours and (known := _TYPES.intersection(types)):
                     yield topic, min(known)
 
-    def _multiplexers(self, output: str) -> set[tuple[str, str]]:
-        """Returns the nodes that take an output and publish what reaches the base: names and namespaces.
+    def _multiplexers(self) -> tuple[set[tuple[str, str]], bool]:
+        """Returns the nodes that take an output and publish what reaches the base, and whether it is a guess.
 
-        Where none does, or what reaches the base is not known, all that take it count. A node that only
-        records takes whatever there is, measured velocities as well.
+        It is one where none of those that take an output does, or where what reaches the base is not known:
+        then all of them count. A node that only records takes all there is, measured velocities as well.
         """
-        takers = _nodes(self._node.get_subscriptions_info_by_topic(output))
         publishing = self._node.get_publishers_info_by_topic(self._mux_output) if self._mux_output else ()
-        multiplexers = takers & _nodes(publishing)
-        if not multiplexers:
-            self._guessed = True
-        return multiplexers or takers
+        all_takers = [_nodes(self._node.get_subscriptions_info_by_topic(output)) for output in self._outputs]
+        known = [takers & _nodes(publishing) for takers in all_takers]
+        counted = [multiplexers or takers for multiplexers, takers in zip(known, all_takers, strict=True)]
+        return set().union(*counted), counted != known
 
     def _follow(self, now_ns: int) -> None:
         """Adds one input that is missing, or removes one: each takes the middleware a few milliseconds."""

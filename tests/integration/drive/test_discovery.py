@@ -72,3 +72,16 @@ def test_where_no_multiplexer_is_discovered_all_that_take_velocities_count(graph
 def test_a_multiplexer_that_is_known_is_believed_at_once(graph: Graph) -> None:
     graph.nodes.add(MUX)
     assert named(OtherSources(graph, [OUTPUT], MUX_OUTPUT), 900 * MS) == {"/cmd_vel_keyboard"}
+
+
+def test_a_multiplexer_that_is_started_again_has_the_inputs_that_it_had(graph: Graph) -> None:
+    """Though the observer alone takes the velocities meanwhile, and counts as well."""
+    graph.nodes.add(MUX)
+    sources = OtherSources(graph, [OUTPUT], MUX_OUTPUT)
+    assert named(sources, DISCOVERY_NS) == {"/cmd_vel_keyboard"}
+    graph.nodes.remove(MUX)
+    named(sources, 2 * DISCOVERY_NS, DISCOVERY_NS)
+    assert set(sources._inputs) == {"/cmd_vel_keyboard", "/wheels/velocity"}
+    graph.nodes.add(MUX)
+    named(sources, 3 * DISCOVERY_NS, 2 * DISCOVERY_NS)
+    assert list(sources._inputs) == ["/cmd_vel_keyboard"]
