@@ -56,6 +56,8 @@ class OtherSources:
         self._ours = {*outputs, mux_output}
         self._inputs: dict[str, _Input] = {}
         self._found: dict[str, str] = {}
+        self._missing: frozenset[str] = frozenset()
+        """Those of `_found` that the multiplexer did not take at the newest look."""
         self._guessed = True
         """Whether a node that is not known to publish for the base counted as the multiplexer."""
         self._looked_ns = self._taken_ns = 0
@@ -74,8 +76,8 @@ class OtherSources:
     def commanding(self, now_ns: int) -> tuple[str, ...]:
         """Returns the topics on which motion was commanded lately.
 
-        None while there has not been time enough to discover which node is the multiplexer: an observer may
-        be all that is known so far, and takes more than the multiplexer does.
+        It names none while there has not been time enough to discover which node is the multiplexer: an
+        observer may be all that is known so far, and takes more than the multiplexer does.
         """
         if now_ns - self._looked_ns >= _LOOK_EVERY_NS:
             self._looked_ns = now_ns
@@ -100,8 +102,13 @@ class OtherSources:
         # A multiplexer that is started again has the inputs that it had; a guess adds to what was known.
         if guessed and not self._guessed:
             self._found |= found
-        elif found:
+        elif found and self._guessed:
             self._found, self._guessed = found, guessed
+        elif found:
+            # Its inputs are discovered one by one: what is missing now may be there at the next look.
+            missing = frozenset(self._found.keys() - found.keys())
+            self._found = {each: self._found[each] for each in missing - self._missing} | found
+            self._missing = missing
 
     def _other_inputs(self, multiplexers: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
         """Yields topic and type of each velocity that these nodes take beside ours."""
@@ -123,14 +130,13 @@ class OtherSources:
         return set().union(*counted), counted != known
 
     def _follow(self, now_ns: int) -> None:
-        """Adds one input that is missing, or removes one: each takes the middleware a few milliseconds."""
-        for topic in self._inputs.keys() - self._found.keys():
-            self._node.destroy_subscription(self._inputs.pop(topic).subscription)
-            return
-        for topic in self._found.keys() - self._inputs.keys():
-            if len(self._inputs) < _MOST:
-                self._inputs[topic] = _Input(self._node, topic, self._found[topic], now_ns)
-            return
+        """Adds an input that is missing, else removes one: each takes the middleware a few milliseconds."""
+        missing = self._found.keys() - self._inputs.keys()
+        if missing and len(self._inputs) < _MOST:
+            topic = missing.pop()
+            self._inputs[topic] = _Input(self._node, topic, self._found[topic], now_ns)
+        elif surplus := self._inputs.keys() - self._found.keys():
+            self._node.destroy_subscription(self._inputs.pop(surplus.pop()).subscription)
 
 
 def _nodes(endpoints: Iterable[Any]) -> set[tuple[str, str]]:

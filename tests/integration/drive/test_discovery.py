@@ -14,7 +14,7 @@ pytestmark = pytest.mark.ros
 OUTPUT, MUX_OUTPUT = "/cmd_vel_gateway", "/cmd_vel"
 TYPE: Final = "geometry_msgs/msg/TwistStamped"
 RECORDER, MUX = "rosbag2_recorder", "twist_mux"
-INPUTS = {RECORDER: [OUTPUT, "/wheels/velocity"], MUX: [OUTPUT, "/cmd_vel_keyboard"]}
+INPUTS: Final = {RECORDER: (OUTPUT, "/wheels/velocity"), MUX: (OUTPUT, "/cmd_vel_keyboard")}
 
 
 @dataclass
@@ -22,15 +22,16 @@ class Graph:
     """As far as a node shows it; a recorder that takes everything is discovered first."""
 
     nodes: set[str] = field(default_factory=lambda: {RECORDER})
+    inputs: dict[str, tuple[str, ...]] = field(default_factory=lambda: dict(INPUTS))
 
     def get_subscriptions_info_by_topic(self, topic: str) -> list[Any]:
-        return [endpoint(name) for name in self.nodes if topic in INPUTS[name]]
+        return [endpoint(name) for name in self.nodes if topic in self.inputs[name]]
 
     def get_publishers_info_by_topic(self, topic: str) -> list[Any]:
         return [endpoint(name) for name in self.nodes if (name, topic) == (MUX, MUX_OUTPUT)]
 
     def get_subscriber_names_and_types_by_node(self, name: str, _namespace: str) -> list[Any]:
-        return [(topic, [TYPE]) for topic in INPUTS[name]]
+        return [(topic, [TYPE]) for topic in self.inputs[name]]
 
     def destroy_subscription(self, _subscription: Any) -> None:
         pass
@@ -85,3 +86,44 @@ def test_a_multiplexer_that_is_started_again_has_the_inputs_that_it_had(graph: G
     graph.nodes.add(MUX)
     named(sources, 3 * DISCOVERY_NS, 2 * DISCOVERY_NS)
     assert list(sources._inputs) == ["/cmd_vel_keyboard"]
+
+
+def test_one_that_is_discovered_input_by_input_keeps_those_that_are_missing_yet(graph: Graph) -> None:
+    """The defect: a source that went on publishing to one of them was not heard until the next look."""
+    graph.nodes.add(MUX)
+    both = graph.inputs[MUX] = (*INPUTS[MUX], "/cmd_vel_autonomy")
+    sources = OtherSources(graph, [OUTPUT], MUX_OUTPUT)
+    named(sources, DISCOVERY_NS)
+    assert set(sources._inputs) == {*both[1:]}
+    graph.inputs[MUX] = INPUTS[MUX]
+    named(sources, DISCOVERY_NS + 500 * MS, DISCOVERY_NS)
+    assert set(sources._inputs) == {*both[1:]}
+    graph.inputs[MUX] = both
+    named(sources, DISCOVERY_NS + 1_000 * MS, DISCOVERY_NS + 500 * MS)
+    assert set(sources._inputs) == {*both[1:]}
+    graph.inputs[MUX] = INPUTS[MUX]
+    named(sources, DISCOVERY_NS + 2_500 * MS, DISCOVERY_NS + 1_000 * MS)
+    assert set(sources._inputs) == {"/cmd_vel_keyboard"}, "it does not take the other any more"
+
+
+def test_the_multiplexers_inputs_are_listened_to_before_the_others_are_left(graph: Graph) -> None:
+    """The defect: not before all that an observer takes had been left, one every 100 ms."""
+    graph.inputs[RECORDER] = (OUTPUT, *(f"/observed_{number}" for number in range(15)))
+    sources = OtherSources(graph, [OUTPUT], MUX_OUTPUT)
+    named(sources, 2_000 * MS)
+    assert len(sources._inputs) == 15
+    graph.nodes.add(MUX)
+    named(sources, 2_100 * MS, 2_000 * MS)
+    assert "/cmd_vel_keyboard" in sources._inputs
+    named(sources, 4_000 * MS, 2_100 * MS)
+    assert list(sources._inputs) == ["/cmd_vel_keyboard"]
+
+
+def test_where_as_many_are_listened_to_as_may_be_one_makes_room_for_an_input(graph: Graph) -> None:
+    graph.inputs[RECORDER] = (OUTPUT, *(f"/observed_{number}" for number in range(30)))
+    sources = OtherSources(graph, [OUTPUT], MUX_OUTPUT)
+    named(sources, 2_500 * MS)
+    assert len(sources._inputs) == 16
+    graph.nodes.add(MUX)
+    named(sources, 2_700 * MS, 2_500 * MS)
+    assert "/cmd_vel_keyboard" in sources._inputs
