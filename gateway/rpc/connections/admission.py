@@ -7,7 +7,7 @@ settings: strangers can't take those of operators. Pending connections are few a
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -35,7 +35,7 @@ SPARED_S: Final = 1.0
 """So long many of one address may be pending, as where all operators come back after a restart, if there is
 room for all."""
 NOTICE_S: Final = 1.0
-"""So long a connection of which a revocation has ended streams makes no room for others: until its caller has
+"""So long a connection that has lost its place by a revocation makes no room for others: until its caller has
 the reason. One that is cut off before takes it for an outage, and connects again."""
 PENDING_STREAMS: Final = 4
 """Of one pending connection, of which the health service is all that it can use."""
@@ -63,6 +63,7 @@ class _Connection:
     pending_since_s: float
     admitted: bool = False
     caller: str = ""
+    credential_ids: tuple[str, ...] = ()
     floods: bool = False
     unused: bool = False
     streams: int = 0
@@ -161,18 +162,22 @@ class Admission:
         if connection is not None:
             connection.streams -= 1
 
-    def admit(self, peer: Peer, caller: str = "") -> None:
+    def admit(self, peer: Peer, caller: str = "", credential_ids: tuple[str, ...] = ()) -> None:
         """Gives the connection a place, after a valid credential was shown or where none is needed.
 
         Args:
             peer: the other end.
             caller: the name on the credential; empty where none is needed.
+            credential_ids: of what was shown.
 
         Raises:
             TooMuchError: all places are taken.
         """
         connection = self._connections.get(peer.address)
-        if connection is None or connection.admitted:
+        if connection is None:
+            return
+        connection.credential_ids = credential_ids
+        if connection.admitted:
             return
         limits, prefix = self._limits, peer.address_prefix
         taken = self._places_of_callers[caller] if caller else 0
@@ -229,7 +234,22 @@ class Admission:
             revoked: whether that has just ended streams of it.
         """
         connection = self._connections.get(peer.address)
-        if connection is not None and connection.admitted:
+        if connection is not None:
+            self._dismiss(connection, revoked=revoked)
+
+    def dismiss_callers(self, lost: Collection[tuple[str, ...]], needed: Collection[str]) -> None:
+        """Takes the places of connections away whose newest caller has lost access, before it calls again.
+
+        Args:
+            lost: `credential_ids` that have become invalid.
+            needed: `Peer.address` of connections with open streams of other callers.
+        """
+        for address, each in self._connections.items():
+            if each.credential_ids in lost and address not in needed:
+                self._dismiss(each, revoked=True)
+
+    def _dismiss(self, connection: _Connection, *, revoked: bool) -> None:
+        if connection.admitted:
             if revoked:
                 connection.revoked_s = self._clock()
             self._free_place(connection)

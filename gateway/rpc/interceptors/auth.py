@@ -88,7 +88,7 @@ class Auth(Interceptor[CallContext]):
         """
         try:
             call.principal = principal = await self._authenticate(call)
-            self._admit(call, principal.name)
+            self._admit(call, principal)
         except (NotAuthenticatedError, TooMuchError) as error:
             self._dismiss(call)
             await self._refuse(call, error)
@@ -119,9 +119,9 @@ class Auth(Interceptor[CallContext]):
             self._admission.note_excess(call.peer)
         return self._refusals.refuse(error, call.waited_s)
 
-    def _admit(self, call: CallContext, name: str) -> None:
+    def _admit(self, call: CallContext, principal: Principal) -> None:
         try:
-            self._admission.admit(call.peer, name)
+            self._admission.admit(call.peer, principal.name, principal.credential_ids)
         except TooMuchError:
             # A stop needs no place.
             if not call.method.unlimited:
@@ -162,6 +162,8 @@ class Auth(Interceptor[CallContext]):
     def end_revoked(self) -> None:
         """Ends every stream whose credential is no longer valid, and renews the secret its caller knows.
 
+        Its caller's connections lose their places, also those without a stream.
+
         Does not wait for the callers: one that does not read delays no other.
         """
         valid = self._authenticator.still_valid
@@ -176,6 +178,9 @@ class Auth(Interceptor[CallContext]):
             ended.append((call, self._streams.pop(call)))
             call.refusal = self._authenticator.access_lost()
             self._dismiss(call, revoked=True)
+        if lost:
+            # Calls of the health service, which need no credential, would keep them.
+            self._admission.dismiss_callers(lost, {each.peer.address for each in self._streams})
         if ended:
             self._abort_later(self._abort_all(ended), name="revocation of streams")
 

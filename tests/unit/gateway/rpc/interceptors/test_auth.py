@@ -111,6 +111,46 @@ async def test_an_admitted_caller_that_loses_access_is_noticed_once(ground: Grou
 
 
 @in_virtual_time
+async def test_a_caller_that_loses_access_loses_its_place_though_it_makes_no_call(ground: Ground) -> None:
+    """The defect: watching the health service, which needs no credential, it kept the place for ever."""
+    peer = call_of().peer
+    ground.admission.take_token(peer)
+    await ground.ping("anna")
+    ground.admission.open_stream(peer)
+    ground.auth.end_revoked()
+    assert not ground.admission.is_pending(peer)
+    ground.revoke("anna")
+    ground.auth.end_revoked()
+    assert ground.admission.is_pending(peer)
+
+
+@in_virtual_time
+async def test_a_place_stays_with_the_caller_that_was_admitted_last(ground: Ground) -> None:
+    peer = call_of().peer
+    ground.admission.take_token(peer)
+    for name in ("anna", "ben"):
+        await ground.ping(name)
+    ground.revoke("anna")
+    ground.auth.end_revoked()
+    assert not ground.admission.is_pending(peer)
+
+
+async def test_a_place_stays_while_a_stream_of_another_caller_is_open(ground: Ground) -> None:
+    pending = []
+
+    async def answers(_request: Any, call: CallContext) -> Any:
+        await ground.ping("anna")
+        ground.revoke("anna")
+        ground.auth.end_revoked()
+        pending.append(ground.admission.is_pending(call.peer))
+        yield b"a status"
+
+    ground.admission.take_token(call_of().peer)
+    await serve([ground.auth], "WatchSystemStatus", answers, token=ground.tokens["ben"].text())
+    assert pending == [False]
+
+
+@in_virtual_time
 async def test_a_caller_that_was_never_admitted_knows_no_secret(ground: Ground) -> None:
     await ground.ping("anna")
     ground.revoke("carla")
