@@ -150,15 +150,17 @@ def test_whatever_ends_it_the_last_message_is_zero(robot: Driving, ending: str) 
 
     def attempt() -> int:
         robot.drive()
-        with robot.moving(loses_worker=ending not in LEAVING):
-            started_ns = robot.state().episode.started_ns
-            ENDINGS[ending](robot)
-            if ending in LOSSES:
-                robot.settled()
-        # Of a stall this holds as well: nothing here is excused by one.
-        wait_until(lambda: not robot.witness.moves(), "the last message is zero")
-        robot.settled()
-        assert not robot.witness.moves()
+        try:
+            with robot.moving(loses_worker=ending not in LEAVING):
+                started_ns = robot.state().episode.started_ns
+                ENDINGS[ending](robot)
+                if ending in LOSSES:
+                    robot.settled()
+        finally:
+            # Of a stall this holds as well: nothing here is excused by one.
+            wait_until(lambda: not robot.witness.moves(), "the last message is zero")
+            robot.settled()
+            assert not robot.witness.moves()
         return started_ns
 
     started_ns = undisturbed(attempt)
