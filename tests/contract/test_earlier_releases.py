@@ -39,6 +39,22 @@ def test_every_key_of_its_configuration_is_accepted(
     load(settings, RELEASED / version / file)
 
 
+@pytest.mark.parametrize(
+    "camera",
+    [
+        "{kind: v4l2, device: /dev/video11}",
+        "{kind: test}",
+        "{kind: file, path: /videos/loop.mp4}",
+        "{kind: gst, description: videotestsrc ! videoconvert}",
+    ],
+)
+def test_the_other_cameras_of_0_1_0_are_accepted(camera: str, tmp_path: Path) -> None:
+    """A file has one camera: that of `released` is another one."""
+    file = tmp_path / "preview.yaml"
+    file.write_text(f"source: {camera}\n", encoding="utf-8")
+    load(PreviewSettings, file)
+
+
 @pytest.mark.parametrize("version", VERSIONS)
 def test_its_credentials_are_valid_for_whom_they_were(version: str) -> None:
     store = parse_store((RELEASED / version / "credentials.json").read_text(encoding="utf-8"))
