@@ -100,6 +100,7 @@ def test_every_program_is_read(robot: Deployment) -> None:
     assert all(each.resident_mib and each.descriptors and each.threads for each in readings.values())
 
 
+@pytest.mark.timeout(600)
 @pytest.mark.parametrize("service", ["gateway", "preview", "drive", "tap", "recorder", "bridge"])
 def test_its_memory_is_less_than_its_container_has(warm_up: WarmUp, service: str) -> None:
     """The drive program is two processes in one container."""
@@ -109,10 +110,12 @@ def test_its_memory_is_less_than_its_container_has(warm_up: WarmUp, service: str
     assert 0 < most < mib(compose()[service]["mem_limit"])
 
 
+@pytest.mark.timeout(600)
 @pytest.mark.parametrize("service", ["gateway", "preview", "drive", "tap", "recorder", "bridge"])
 def test_the_kept_log_covers_an_hour_of_faults(warm_up: WarmUp, service: str) -> None:
     kept = compose()[service]["logging"]["options"]
-    kept_bytes = mib(kept["max-size"]) * int(kept["max-file"]) * 1_000_000
+    # The newest file may have just been begun.
+    kept_bytes = mib(kept["max-size"]) * (int(kept["max-file"]) - 1) * 1_000_000
     first, last = (readings[f"robot-{service}"].logged_bytes for readings in warm_up.readings[::ROUNDS])
     per_s = (last - first) / warm_up.took_s
     print(f"robot-{service}: {per_s:.0f} bytes a second")
@@ -123,7 +126,7 @@ def test_the_kept_log_covers_an_hour_of_faults(warm_up: WarmUp, service: str) ->
 def test_no_program_keeps_descriptors_or_threads_of_what_has_ended(
     robot: Deployment, warm_up: WarmUp
 ) -> None:
-    most = most_of(warm_up.readings)
+    most = most_of(warm_up.readings[1:])
     spans: list[dict[str, Reading]] = []
     for _ in range(SPANS):
         rounds(robot, 2 * ROUNDS)
