@@ -1,6 +1,8 @@
-"""scripts/upgrade-robot without an engine: docker is a stand-in, by which all containers are healthy."""
+"""scripts/upgrade-robot without an engine: docker is a stand-in, by which all containers become healthy."""
 
 import os
+import shlex
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -11,12 +13,16 @@ DOCKER = """#!/bin/sh
 echo "$*" >> "$SEEN/commands"
 case "$*" in
   # Where the real one may ask.
-  compose*" up "* | compose*" run "*) cat >> "$SEEN/read" ;;
+  compose*" up "*) cat >> "$SEEN/read"; sleep "${UP_TAKES_S:-0}" ;;
+  compose*" run "*) cat >> "$SEEN/read" ;;
   compose*"config --services") printf 'gateway-config\\ngateway\\n' ;;
   compose*"config --images"*) echo robot-gateway:any ;;
   compose*config) echo 'name: robot' ;;
   compose*" ps --all --quiet gateway") echo 0123456789ab ;;
-  inspect*State.Health*) echo healthy ;;
+  inspect*State.Health*)
+    # The engine's first check comes some time after the start.
+    if [ -e "$SEEN/checked" ]; then echo healthy; else echo starting; fi
+    touch "$SEEN/checked" ;;
 esac
 """
 
@@ -33,27 +39,35 @@ def robot(tmp_path: Path) -> Path:
     (before / "compose.yaml").write_text("# 1.0.0\n")
     for scripts in (directory / "scripts", before / "scripts"):
         scripts.mkdir()
-    (directory / "scripts/upgrade-robot").touch()
-    return directory
-
-
-@pytest.fixture
-def back(robot: Path, tmp_path: Path) -> "subprocess.CompletedProcess[str]":
-    """A rollback that has ended well; its input says yes to everything."""
+    for name in ("upgrade-robot", "robot-directory.sh", "images"):
+        shutil.copy(ROOT / "scripts" / name, directory / "scripts")
     docker = tmp_path / "bin/docker"
     docker.parent.mkdir()
     docker.write_text(DOCKER)
     docker.chmod(0o755)
     (tmp_path / "read").touch()
-    ended = subprocess.run(
-        [ROOT / "scripts/upgrade-robot", "--robot", robot, "--rollback"],
-        env={**os.environ, "PATH": f"{docker.parent}:{os.environ['PATH']}", "SEEN": str(tmp_path)},
+    return directory
+
+
+def run(robot: Path, *command: str | Path, **environment: str) -> "subprocess.CompletedProcess[str]":
+    """Runs a command; its input says yes to everything."""
+    seen = robot.parent
+    path = f"{seen / 'bin'}:{os.environ['PATH']}"
+    return subprocess.run(
+        command,
+        env={**os.environ, "PATH": path, "SEEN": str(seen), **environment},
         input="y\n" * 9,
         capture_output=True,
         text=True,
         timeout=60,
         check=False,
     )
+
+
+@pytest.fixture
+def back(robot: Path) -> "subprocess.CompletedProcess[str]":
+    """A rollback that has ended well."""
+    ended = run(robot, ROOT / "scripts/upgrade-robot", "--robot", robot, "--rollback")
     assert ended.returncode == 0, ended.stderr
     return ended
 
@@ -75,6 +89,18 @@ def test_the_way_forth_from_a_version_without_the_script_is_named(
 ) -> None:
     """The defect: it named scripts/upgrade-robot, which was gone."""
     assert not (robot / "scripts/upgrade-robot").exists()
+    way = shlex.split(back.stderr.rstrip().rpartition("Forth to 9.1.0: ")[2])
     script = robot / ".upgrade/trees/9.1.0/scripts/upgrade-robot"
-    assert script.exists()
-    assert back.stderr.rstrip().endswith(f"Forth to 9.1.0: {script} --robot {robot} --rollback")
+    assert way == [str(script), "--robot", str(robot), "--rollback"]
+    forth = run(robot, *way)
+    assert forth.returncode == 0, forth.stderr
+    assert (robot / ".env").read_text() == "OWN=1\nTAG=9.1.0\n"
+    assert (robot / "scripts/upgrade-robot").exists()
+
+
+def test_the_time_to_become_healthy_begins_with_the_start(robot: Path) -> None:
+    """The defect: while Docker replaced the containers it went by, and a healthy release was left."""
+    slow = {"UPGRADE_HEALTHY_WITHIN_S": "5", "UP_TAKES_S": "5"}
+    ended = run(robot, ROOT / "scripts/upgrade-robot", "--robot", robot, "--rollback", **slow)
+    assert ended.returncode == 0, ended.stderr
+    assert (robot / ".env").read_text() == "OWN=1\nTAG=1.0.0\n"
