@@ -30,7 +30,7 @@ esac
 @pytest.fixture
 def robot(tmp_path: Path) -> Path:
     """The directory of a robot that runs 9.1.0, and before it 1.0.0, which has no scripts/upgrade-robot."""
-    directory = tmp_path / "robot"
+    directory = tmp_path / "a robot"
     before = directory / ".upgrade/trees/1.0.0"
     before.mkdir(parents=True)
     (directory / ".env").write_text("OWN=1\nTAG=9.1.0\n")
