@@ -92,3 +92,8 @@ def _cpu_times_ns(pid: int) -> dict[str, tuple[str, int]]:
 def resident_mib(pid: int) -> float:
     """Memory of a process that is in RAM, in MiB."""
     return float(psutil.Process(pid).memory_info().rss) / 2**20
+
+
+def shared_mib(pid: int) -> float:
+    """The part of `resident_mib` that other processes may have as well, in MiB: files, code among them."""
+    return float(psutil.Process(pid).memory_info().shared) / 2**20

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Self
 
-from bench.processes import resident_mib
+from bench.processes import resident_mib, shared_mib
 from bench.rows import Row
 
 FEWEST_ROUNDS: Final = 100
@@ -22,18 +22,21 @@ class Reading:
 
     Attributes:
         logged_bytes: since its start; 0 where its log is not known.
+        shared_mib: the part of the resident memory that other processes may have as well.
     """
 
     resident_mib: float
     descriptors: int
     threads: int = 0
     logged_bytes: int = 0
+    shared_mib: float = 0.0
 
     @classmethod
     def of(cls, pid: int, log: Path | None = None) -> Self:
         """Reads a process, and the size of its log."""
         descriptors, threads = (len(list(Path(f"/proc/{pid}/{each}").iterdir())) for each in ("fd", "task"))
-        return cls(resident_mib(pid), descriptors, threads, log.stat().st_size if log else 0)
+        logged_bytes = log.stat().st_size if log else 0
+        return cls(resident_mib(pid), descriptors, threads, logged_bytes, shared_mib(pid))
 
 
 @dataclass(frozen=True, slots=True)
