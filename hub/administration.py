@@ -26,10 +26,11 @@ from fleet import names
 from fleet.connection import Hub, connect
 from fleet.errors import HubError, HubReason
 from fleet.identity import Credentials, Permissions, new_user
-from hub import permissions, streams
+from hub import permissions
 from hub.accounts import account_keys, account_tokens, add_accounts
 from hub.directory import HubDirectory, HubRecord, KeyName, Kind, User, check_name
-from hub.electing import once_elected
+from hub.jetstream import streams
+from hub.jetstream.electing import once_elected
 
 _CONNECT_S: Final = 5.0
 """For a connection with one of the servers; a silent one is no reason to wait (fleet/opening.py)."""

@@ -21,10 +21,10 @@ from hub import administration, receipts
 from hub.accounts import refresh_nodes
 from hub.creation import HubPlan, create
 from hub.directory import HubDirectory, Kind, User
+from hub.jetstream.streams import EVENTS_BYTES, EVENTS_DAYS, RECORDINGS_BYTES, StreamLimits
 from hub.receiver.cli import Config, receiver
 from hub.receiver.config import ReceiverSettings
 from hub.server_config import Node, Places
-from hub.streams import EVENTS_BYTES, EVENTS_DAYS, RECORDINGS_BYTES, StreamLimits
 
 app = typer.Typer(help="The fleet's hub: make it, enroll robots, revoke them.", no_args_is_help=True)
 

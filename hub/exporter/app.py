@@ -14,7 +14,7 @@ from fleet.connection import FleetAddress, Hub, connect
 from fleet.errors import HubError
 from fleet.names import ROBOTS, STATES
 from hub.exporter.collector import FleetCollector
-from hub.streams import REPORTED, use_of
+from hub.jetstream.streams import REPORTED, use_of
 
 _MS_PER_S: Final = 1000
 _CLOCK_AGAIN_AFTER_S: Final = 60.0

@@ -16,7 +16,7 @@ from fleet.enrolment import is_revoked
 from fleet.names import ROBOT_NAME
 from fleet.reading import NotReadableError, robot_state
 from fleet.standing import Evidence, Standing, standing
-from hub.streams import StreamUse
+from hub.jetstream.streams import StreamUse
 from omniseer.fleet.v1.state_pb2 import RobotState
 from omniseer.gateway.v1 import fault_pb2, value_pb2
 

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from fleet import names
 from fleet.connection import FleetAddress, Hub, Start, connect
-from hub.streams import set_up
+from hub.jetstream.streams import set_up
 from omniseer.fleet.v1.command_pb2 import Command, CommandResult
 from omniseer.fleet.v1.event_pb2 import EventBatch
 from omniseer.fleet.v1.state_pb2 import RobotState

@@ -14,7 +14,7 @@ import grpc
 from bridge.rpc.client import newest_state
 from fleet import names
 from fleet.connection import FleetAddress, Hub, Start, connect
-from hub.streams import add_command_consumer, set_up
+from hub.jetstream.streams import add_command_consumer, set_up
 from omniseer.bridge.v1 import bridge_service_pb2 as pb
 from omniseer.fleet.v1.event_pb2 import DROP_REASON_OUTBOX_LOST, DropReason, EventBatch
 from omniseer.gateway.v1 import cloud_pb2

@@ -16,7 +16,7 @@ from fleet.errors import HubError, HubReason, UnreachableError
 from fleet.replies import Message
 from fleet.serving import Request
 from fleet.session import Session
-from hub import streams
+from hub.jetstream import streams
 from tests.support.eventually import at_most
 from tests.support.free import free_tcp_port
 from tests.support.nats_servers import NatsServers, nats_servers

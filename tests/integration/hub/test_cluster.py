@@ -12,8 +12,8 @@ import pytest
 from fleet import names
 from fleet.connection import FleetAddress, Hub, Published, Start, connect
 from fleet.errors import HubError, HubReason
-from hub import streams
 from hub.accounts import account_keys
+from hub.jetstream import streams
 from tests.support.eventually import eventually
 from tests.support.hub_patience import in_the_end
 from tests.support.nats_servers import NatsServers, nats_servers

@@ -17,8 +17,8 @@ from fleet.serving import Request
 from hub import administration
 from hub.cli import app
 from hub.directory import ACCOUNTS_OF_PEOPLE, Kind, User
+from hub.jetstream.streams import stream_configs
 from hub.server_config import with_accounts
-from hub.streams import stream_configs
 from tests.support.attacked_hub import connected
 from tests.support.secure_hub import BOTH_SERVERS, SecureHub, until_accepted
 

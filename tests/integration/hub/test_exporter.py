@@ -13,7 +13,7 @@ from fleet import names
 from fleet.connection import FleetAddress, connect
 from hub.exporter.app import export
 from hub.exporter.collector import FleetCollector
-from hub.streams import set_up
+from hub.jetstream.streams import set_up
 from tests.support.eventually import eventually
 from tests.support.fleet_values import healthy_state
 from tests.support.nats_servers import NatsServers, nats_servers

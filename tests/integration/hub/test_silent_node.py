@@ -30,7 +30,7 @@ def cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[SecureH
     """Three nodes; the first one that the administration tries leads the list of robots."""
     monkeypatch.setattr("fleet.connection.random.shuffle", lambda _servers: None)
     # Enough for a machine that stands still itself.
-    for bound in ("administration._CONNECT_S", "electing.ELECTED_WITHIN_S"):
+    for bound in ("administration._CONNECT_S", "jetstream.electing.ELECTED_WITHIN_S"):
         monkeypatch.setattr(f"hub.{bound}", 30.0)
     with secure_hub(tmp_path, nodes=3) as hub:
         leader = hub.servers.leader(f"KV_{names.ROBOTS}")

@@ -8,7 +8,7 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from hub.exporter.collector import MOST_ROBOTS, MOST_SERIES, FleetCollector
-from hub.streams import StreamUse
+from hub.jetstream.streams import StreamUse
 from omniseer.gateway.v1.fault_pb2 import FAULT_SEVERITY_ERROR, FAULT_SEVERITY_WARNING
 from omniseer.gateway.v1.value_pb2 import TEXT_LEVEL_ERROR
 from tests.support.fleet_values import healthy_state, wrong_bytes

@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from fleet.errors import HubError, HubReason
-from hub import electing
+from hub.jetstream import electing
 from tests.support.virtual_time import in_virtual_time
 
 

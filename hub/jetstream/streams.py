@@ -9,7 +9,7 @@ from typing import Any, Final
 from fleet import names
 from fleet.connection import Hub
 from fleet.errors import HubError, HubReason
-from hub.electing import once_joined
+from hub.jetstream.electing import once_joined
 
 _DAY_NS: Final = 86_400 * 1_000_000_000
 _MIB: Final = 1024 * 1024

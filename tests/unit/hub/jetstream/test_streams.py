@@ -7,7 +7,7 @@ import pytest
 
 from fleet import names
 from fleet.errors import HubError, HubReason
-from hub import streams
+from hub.jetstream import streams
 from tests.support.virtual_time import in_virtual_time
 
 

@@ -1,0 +1,1 @@
+"""JetStream at the hub: its streams and buckets, and waiting for the leaders that the nodes elect."""
