@@ -11,16 +11,16 @@ from typing import Final
 
 from common.ros_node import OwnNode, ros_node
 from common.ros_transport import use_udp
-from drive.base import VelocityPublisher, base
 from drive.config import DriveSettings
-from drive.endpoint import Endpoint
-from drive.guard import Guard, worker_heartbeats, worker_kills, worker_stops
-from drive.machine import OnLoss, State
-from drive.real_time import lock_memory, raise_priority
-from drive.stop_file import StopFile, Stops, read_stops
-from drive.values import Latch
-from drive.wire import welcome
-from drive.worker import Worker, new_instance_id
+from drive.endpoint.endpoint import Endpoint
+from drive.endpoint.wire import welcome
+from drive.motion.machine import OnLoss, State
+from drive.motion.values import Latch
+from drive.processes.guard import Guard, worker_heartbeats, worker_kills, worker_stops
+from drive.processes.real_time import lock_memory, raise_priority
+from drive.processes.stop_file import StopFile, Stops, read_stops
+from drive.processes.worker import Worker, new_instance_id
+from drive.ros.base import VelocityPublisher, base
 
 _log = logging.getLogger(__name__)
 

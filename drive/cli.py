@@ -42,7 +42,7 @@ def pulse(config_file: _Config = None) -> None:
     """Runs the process that moves the robot for `doctor --pulse`, which watches it."""
     settings = _load(config_file)
     from drive.doctor.pulse import run_pulse  # noqa: PLC0415
-    from drive.guard import worker_heartbeats  # noqa: PLC0415
+    from drive.processes.guard import worker_heartbeats  # noqa: PLC0415
 
     with worker_heartbeats() as heartbeats:
         run_pulse(settings, heartbeats)

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from common.config import load
 from common.healthcheck import check_state
-from drive.client import observed_state
 from drive.config import DriveSettings
+from drive.endpoint.client import observed_state
 from omniseer.drive.v1 import drive_pb2 as pb
 
 

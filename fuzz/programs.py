@@ -7,9 +7,9 @@ from typing import Final
 
 from google.protobuf.message import DecodeError
 
-from drive import wire as drive_wire
-from drive.machine import Observe, Rules, State, Tick, step
-from drive.values import ZERO, Surroundings
+from drive.endpoint import wire as drive_wire
+from drive.motion.machine import Observe, Rules, State, Tick, step
+from drive.motion.values import ZERO, Surroundings
 from gateway.links.bridge import wire as bridge_wire
 from gateway.links.drive import wire as drive_link_wire
 from gateway.links.recorder import wire as recorder_wire

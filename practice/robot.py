@@ -1,15 +1,15 @@
 """The practice robot: the drive program's own decisions, and a base that follows them. Pure.
 
-What `drive.worker` does with the real machine and the graph, this does with the same machine, default rules,
-and the double of the base that simrobot has.
+What `drive.processes.worker` does with the real machine and the graph, this does with the same machine,
+default rules, and the double of the base that simrobot has.
 """
 
 from dataclasses import replace
 from typing import Final
 
-from drive.machine import EndLease, Event, GrantLease, Observe, Rules, State, Tick, step
-from drive.shaping import supervised_limit_mps, supervised_limit_rad_s
-from drive.values import MS, ZERO, Command, LeaseEnd, Surroundings
+from drive.motion.machine import EndLease, Event, GrantLease, Observe, Rules, State, Tick, step
+from drive.motion.shaping import supervised_limit_mps, supervised_limit_rad_s
+from drive.motion.values import MS, ZERO, Command, LeaseEnd, Surroundings
 from simrobot.base import Base, Twist
 from simrobot.motion import Pose
 

@@ -20,8 +20,8 @@ from console.client import (
     Unsupported,
     results,
 )
-from drive.machine import Enable, EndLease, Event, GrantLease, Reset, Stop
-from drive.values import Command, LeaseEnd
+from drive.motion.machine import Enable, EndLease, Event, GrantLease, Reset, Stop
+from drive.motion.values import Command, LeaseEnd
 from practice import wire
 from practice.lane import Lane, LaneTransport, Way
 from practice.network import Network
@@ -32,7 +32,7 @@ ResultT = TypeVar("ResultT")
 
 _CYCLE_S: Final = 0.02
 _REPORT_EVERY_S: Final = 0.05
-"""As the drive program (drive/worker.py)."""
+"""As the drive program (drive/processes/worker.py)."""
 _ANSWER_WITHIN_S: Final = 1.5
 
 

@@ -8,8 +8,8 @@ from common.version import project_version
 from console.client import results
 from console.client.drive_lanes import LANES
 from console.client.mapping.reader import read
-from drive.machine import Rules, State
-from drive.values import MS, ZERO, Command, Lease, Supervision, Velocity
+from drive.motion.machine import Rules, State
+from drive.motion.values import MS, ZERO, Command, Lease, Supervision, Velocity
 from omniseer.gateway.v1 import overlay_pb2, preview_pb2, system_status_pb2, teleop_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from practice.robot import PracticeRobot

@@ -7,9 +7,9 @@ from common.config_finding import checked_settings
 from common.errors import UserError
 from common.findings import Finding, note, wrong
 from common.ros_transport_findings import transport_finding
-from drive.client import observed_state
 from drive.config import DriveSettings
 from drive.doctor.judgement import graph_findings, program_findings, pulse_findings
+from drive.endpoint.client import observed_state
 
 
 def examine(config_file: Path | None, *, with_pulse: bool) -> Iterator[Finding]:

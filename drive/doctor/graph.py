@@ -9,8 +9,8 @@ from drive.config import DriveSettings
 from drive.doctor.facts import GraphFacts, Rank, TopicFacts
 from drive.doctor.parameters import Parameters, parameters_by
 from drive.doctor.ranking import INPUTS, LOCKS, ranks_in, wanted
-from drive.subscriptions import newest, subscribe, velocity_of
-from drive.values import ZERO
+from drive.motion.values import ZERO
+from drive.ros.subscriptions import newest, subscribe, velocity_of
 
 DISCOVERY_S: Final = 3.0
 _LISTEN_S: Final = 1.0

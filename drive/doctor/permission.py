@@ -7,11 +7,11 @@ from typing import Any, Final
 from google.protobuf.message import DecodeError
 
 from common.ros_node import OwnNode
-from drive.client import StateReader
 from drive.config import DriveSettings
-from drive.stop_file import read_stops
-from drive.stop_input import stop_inputs
-from drive.values import MS
+from drive.endpoint.client import StateReader
+from drive.motion.values import MS
+from drive.processes.stop_file import read_stops
+from drive.ros.stop_input import stop_inputs
 from omniseer.drive.v1 import drive_pb2 as pb
 
 _SILENT_NS: Final = 1_500 * MS

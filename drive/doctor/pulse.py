@@ -14,13 +14,13 @@ from dataclasses import asdict
 from typing import Any, Final
 
 from common.ros_node import OwnNode, ros_node
-from drive.base import VelocityPublisher
 from drive.config import DriveSettings
 from drive.doctor.facts import PulseFacts
 from drive.doctor.graph import DISCOVERY_S
 from drive.doctor.permission import Permission
-from drive.subscriptions import is_still, newest, subscribe, velocity_of
-from drive.values import ZERO, Velocity
+from drive.motion.values import ZERO, Velocity
+from drive.ros.base import VelocityPublisher
+from drive.ros.subscriptions import is_still, newest, subscribe, velocity_of
 
 BEAT: Final = b"."
 """A heartbeat; the only other packet is the result."""

@@ -12,12 +12,12 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
 
-from drive.base import VelocityPublisher
 from drive.config import DriveSettings
 from drive.doctor.facts import PulseFacts
 from drive.doctor.pulse import BEAT, PULSE_MPS
-from drive.guard import HEARTBEATS
-from drive.values import ZERO
+from drive.motion.values import ZERO
+from drive.processes.guard import HEARTBEATS
+from drive.ros.base import VelocityPublisher
 
 _START_S: Final = 20.0
 """From the start of the process to its first heartbeat; imports and the discovery of ROS take seconds."""

@@ -86,7 +86,7 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
             (
                 *("gateway", "preview", "recorder", "rclpy", "gi", "grpc", "socket"),
                 *("console.client.aio", "console.client.blocking", "console.client.transport"),
-                *("drive.worker", "drive.endpoint", "drive.guard", "drive.base", "drive.client", "drive.app"),
+                *("drive.processes", "drive.endpoint", "drive.ros", "drive.app"),
                 *("simrobot.drive_train", "simrobot.robot", "simrobot.app", "simrobot.control"),
             ),
         ),
@@ -212,22 +212,13 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("tap/config.py", (*HEAVY, "asyncio", "tap")),
         ("common/video_tap.py", (*HEAVY, *WIRE, "common", "asyncio", "time")),
         *(
-            (f"drive/{name}.py", (*HEAVY, *WIRE, "omniseer.drive", "drive.config", "drive.base", "time"))
-            for name in (
-                "values",
-                "shaping",
-                "inhibits",
-                "phases",
-                "machine",
-                "outranking",
-                "episode",
-                "watch",
-            )
+            (pure, (*HEAVY, *WIRE, "omniseer.drive", "drive.config", "drive.ros.base", "time"))
+            for pure in ("drive/motion/", "drive/ros/outranking.py", "drive/processes/watch.py")
         ),
-        ("drive/guard.py", (*HEAVY, "drive.base")),
-        *((f"drive/{name}.py", HEAVY) for name in ("reach", "endpoint", "wire")),
-        *((f"drive/{name}.py", ("drive.machine",)) for name in ("base", "takers")),
-        ("drive/worker.py", (*HEAVY, "drive.base")),
+        ("drive/motion/", ("drive.config", "drive.endpoint", "drive.processes", "drive.ros")),
+        ("drive/endpoint/", (*HEAVY, "drive.processes", "drive.ros")),
+        ("drive/processes/", (*HEAVY, "drive.config", "drive.ros")),
+        ("drive/ros/", ("drive.motion.machine", "drive.endpoint", "drive.processes")),
         *(
             (f"console/{name}.py", (*HEAVY, *WIRE, "asyncio", "typer", "rich", "console.client"))
             for name in ("target", "credentials")
@@ -276,9 +267,9 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
             (
                 "common/ros_node.py",
                 "gateway/ros/",
-                "drive/base.py",
-                "drive/stop_input.py",
-                "drive/subscriptions.py",
+                "drive/ros/base.py",
+                "drive/ros/stop_input.py",
+                "drive/ros/subscriptions.py",
                 "drive/doctor",
                 "recorder/intake/",
                 "simrobot/",

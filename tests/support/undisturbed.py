@@ -25,7 +25,8 @@ ATTEMPTS: Final = 8
 WORKER_LOST: Final = "the worker of the drive program was lost"
 END: Final = "(exit code "
 SILENT: Final = "no heartbeat of the worker for "
-"""What the guard (drive/guard.py) logs of each end of a worker, and of one that it killed for its silence."""
+"""What the guard (drive/processes/guard.py) logs of each end of a worker, and of one that it killed for its
+silence."""
 _LOGGED_WITHIN_S: Final = 5.0
 _ENDS_WITHIN_S: Final = 0.1
 """A process that was killed gives its memory back before it has ended; the zeros may be seen before that."""

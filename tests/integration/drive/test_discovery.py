@@ -6,8 +6,8 @@ from typing import Any, Final
 
 import pytest
 
-from drive.other_sources import OtherSources
-from drive.values import DISCOVERY_NS, MS
+from drive.motion.values import DISCOVERY_NS, MS
+from drive.ros.other_sources import OtherSources
 
 pytestmark = pytest.mark.ros
 
@@ -44,9 +44,9 @@ def endpoint(name: str) -> Any:
 @pytest.fixture
 def graph(monkeypatch: pytest.MonkeyPatch) -> Graph:
     """Its messages are none: what is new counts as motion for a while."""
-    monkeypatch.setattr("drive.other_sources.subscribe", lambda *_: None)
-    monkeypatch.setattr("drive.other_sources.newest", lambda _: None)
-    monkeypatch.setattr("drive.other_sources.time.monotonic_ns", lambda: 0)
+    monkeypatch.setattr("drive.ros.other_sources.subscribe", lambda *_: None)
+    monkeypatch.setattr("drive.ros.other_sources.newest", lambda _: None)
+    monkeypatch.setattr("drive.ros.other_sources.time.monotonic_ns", lambda: 0)
     return Graph()
 
 

@@ -25,8 +25,9 @@ from tests.support.waiting import wait_until
 pytestmark = [pytest.mark.ros, pytest.mark.timed]
 
 AT_THE_BASE_MS = 280
-"""docs/driving.md: nothing is published by a command older than 250 ms, which tests/unit/drive/test_worker.py
-judges to the millisecond. The rest is the last velocity's way through the middleware and the mux."""
+"""docs/driving.md: nothing is published by a command older than 250 ms, which
+tests/unit/drive/processes/test_worker.py judges to the millisecond. The rest is the last velocity's way
+through the middleware and the mux."""
 
 
 def oldest_command_ms(robot: Driving, since_ns: int) -> float:

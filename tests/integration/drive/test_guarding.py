@@ -15,9 +15,9 @@ from typing import Any
 
 import pytest
 
-from drive.guard import HEARTBEATS, KILLS, STOPS
-from drive.reach import ReachSaid
-from drive.stop_file import Stops
+from drive.processes.guard import HEARTBEATS, KILLS, STOPS
+from drive.processes.reach import ReachSaid
+from drive.processes.stop_file import Stops
 from omniseer.drive.v1 import drive_pb2 as pb
 from tests.support.driving import Driving, driving, witness
 from tests.support.ros import simulated_robot

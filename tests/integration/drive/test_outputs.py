@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 from common.ros_node import message_class, ros_node
-from drive.base import VelocityPublisher
 from drive.config import Output
-from drive.subscriptions import NEWEST, newest, subscribe, velocity_of
-from drive.values import ZERO, Velocity
+from drive.motion.values import ZERO, Velocity
+from drive.ros.base import VelocityPublisher
+from drive.ros.subscriptions import NEWEST, newest, subscribe, velocity_of
 from tests.support.waiting import wait_until
 
 pytestmark = pytest.mark.ros

@@ -48,7 +48,7 @@ def test_all_code_is_in_memory_and_stays_there(robot: Driving) -> None:
 def test_without_the_right_to_it_the_program_runs_and_says_so() -> None:
     script = (
         "import logging, os, resource\n"
-        "from drive.real_time import lock_memory\n"
+        "from drive.processes.real_time import lock_memory\n"
         "logging.basicConfig(level=logging.INFO)\n"
         "resource.setrlimit(resource.RLIMIT_MEMLOCK, (0, 0))\n"
         "os.setuid(65534)\n"

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from common.config import load
 from common.errors import UserError
 from drive.config import DriveSettings
-from drive.machine import OnLoss, Rules
+from drive.motion.machine import OnLoss, Rules
 
 
 def test_the_defaults_are_those_of_the_machine() -> None:

@@ -4,9 +4,9 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from drive.machine import EndLease, GrantLease, Reset, Rules, Stop
-from drive.phases import Phase
-from drive.values import MS, Command, Inhibit, Lease, LeaseEnd, Velocity
+from drive.motion.machine import EndLease, GrantLease, Reset, Rules, Stop
+from drive.motion.phases import Phase
+from drive.motion.values import MS, Command, Inhibit, Lease, LeaseEnd, Velocity
 from practice.robot import PracticeRobot
 
 CYCLE_NS = 20 * MS

@@ -16,9 +16,9 @@ from console.client.drive_commands import Commands, Hold
 from console.client.drive_lanes import LANES, OnTheirWay
 from console.client.mapping.driving import DriveCommand
 from console.client.robot_clock import RobotClock
-from drive.machine import GrantLease, Observe, Rules, State, Tick, step
-from drive.phases import Phase
-from drive.values import Command, Lease, Supervision, Surroundings, Velocity
+from drive.motion.machine import GrantLease, Observe, Rules, State, Tick, step
+from drive.motion.phases import Phase
+from drive.motion.values import Command, Lease, Supervision, Surroundings, Velocity
 
 LOSS: Final = 0.1
 WAY_S: Final = 0.01

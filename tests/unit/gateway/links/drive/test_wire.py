@@ -4,9 +4,9 @@ from dataclasses import fields
 
 import pytest
 
-from drive.values import Inhibit
-from drive.values import LeaseEnd as DriveLeaseEnd
-from drive.wire import event_of
+from drive.endpoint.wire import event_of
+from drive.motion.values import Inhibit
+from drive.motion.values import LeaseEnd as DriveLeaseEnd
 from gateway.links.drive import wire
 from gateway.links.drive.commands import ENDS
 from gateway.links.drive.state import DriveCommand

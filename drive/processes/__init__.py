@@ -1,0 +1,1 @@
+"""The two processes: the worker that moves the robot, and the guard that watches it."""
