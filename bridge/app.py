@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any
 from bridge.commands.consumer import CommandConsumer
 from bridge.commands.pending_requests import PendingRequests
 from bridge.config import BridgeSettings
-from bridge.connection_status import Status
+from bridge.connection.connection_status import Status
+from bridge.connection.robot_state import is_charging
+from bridge.connection.sender import Sender
+from bridge.connection.state_sender import StateSender
+from bridge.connection.uploading import NoUploads, QueuedUploads, Uploading, apply_rule
 from bridge.outbox.outbox import Outbox, outbox
 from bridge.outbox.uploads import StoredUploads, most_kept
 from bridge.robot.calls import GatewayCalls
 from bridge.robot.events import EventReader
 from bridge.robot.status import StatusReader
-from bridge.robot_state import is_charging
 from bridge.rpc.servicer import SERVICE, BridgeServicer
-from bridge.sender import Sender
-from bridge.state_sender import StateSender
-from bridge.uploading import NoUploads, QueuedUploads, Uploading, apply_rule
 from bridge.uploads import hours
 from bridge.uploads.kept_queue import KeptQueue
 from bridge.uploads.uploads import Fleet, Uploads

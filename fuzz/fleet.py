@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from google.protobuf.message import DecodeError
 
-from bridge.robot_state import Own, robot_state, same_but_for_time
+from bridge.connection.robot_state import Own, robot_state, same_but_for_time
 from bridge.uploads.route import index_of
 from console.fleet.columns import COLUMNS
 from console.fleet.details import detail_rows

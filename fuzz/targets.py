@@ -15,8 +15,8 @@ from google.protobuf.message import DecodeError, Message
 
 from bridge.commands.judgement import LONGEST_EXPIRY_S, Snapshot, Stray, judge
 from bridge.commands.judgement import Request as Handed
+from bridge.events.values import DropReason, Position
 from bridge.robot.feed import Feed, FeedError
-from bridge.values import DropReason, Position
 from common import camera_tap
 from common.ca import certificate_info
 from common.config import load

@@ -1,16 +1,17 @@
 """Takes commands from the hub, one at a time, and acknowledges each when its result is on the disk."""
 
 import asyncio
+import ctypes
 import logging
+import time
 from collections.abc import Callable
 from typing import Final
 
-from bridge.clock import synchronised_unix_s
 from bridge.commands.hub_time import HubTime, age_s, hub_time
 from bridge.commands.judgement import Denial, Judgement, Request, Stray, judge
 from bridge.commands.pending_requests import Pending, PendingRequests
 from bridge.config import BridgeSettings
-from bridge.values import OutboxError
+from bridge.outbox.errors import OutboxError
 from common.jittered_backoff import JitteredBackoff
 from common.suspend import elapsed_s
 from common.token_bucket import TokenBucket
@@ -30,6 +31,10 @@ perhaps, keeps the next command back for minutes instead of hours."""
 _LOOK_S: Final = 0.5
 _TIME_GOOD_S: Final = 3600.0
 """Quartz clocks differ by less than 0.4 s in that time."""
+_TIME_ERROR: Final = 5
+"""Clock state of adjtimex(2): not synchronised. Setting the clock by hand causes it, too."""
+_TIMEX_BYTES: Final = 512
+"""More than struct timex has on any platform; zeros read without changing anything."""
 
 
 class CommandConsumer:
@@ -111,7 +116,7 @@ class CommandConsumer:
                 await self._hand_over(judgement, delivery)
 
     async def _judge(self, delivery: Delivery) -> Judgement:
-        age = age_s(delivery.unix_s, self._clock(), await self._hub_time(), synchronised_unix_s())
+        age = age_s(delivery.unix_s, self._clock(), await self._hub_time(), _synchronised_unix_s())
         return judge(delivery.subject, delivery.payload, robot=self._robot, allowed=self._allowed, age_s=age)
 
     async def _deny(self, denial: Denial, delivery: Delivery) -> None:
@@ -156,3 +161,12 @@ class CommandConsumer:
                 info = None
             self._time, self._time_of = hub_time(info, now_s), connections
         return self._time
+
+
+def _synchronised_unix_s() -> float | None:
+    """Returns the calendar clock in seconds since 1970 UTC; None if the kernel has it not synchronised."""
+    try:
+        state = ctypes.CDLL(None, use_errno=True).adjtimex(ctypes.create_string_buffer(_TIMEX_BYTES))
+    except AttributeError:
+        return None  # Another C library.
+    return time.time() if 0 <= state < _TIME_ERROR else None

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from bridge.commands.judgement import Denial, Request
+from bridge.outbox.errors import OutboxError
 from bridge.outbox.outbox import Outbox
-from bridge.values import OutboxError
 from common.errors import NotFoundError
 from common.reasons import Reason
 from common.suspend import elapsed_s

@@ -4,9 +4,8 @@ from collections.abc import Iterator
 from datetime import datetime
 from typing import Final
 
-from bridge.config import BridgeSettings
+from bridge.config import BridgeSettings, UploadSettings
 from bridge.uploads import hours
-from bridge.uploads.config import UploadSettings
 from common.findings import Finding, good, note, wrong
 from omniseer.gateway.v1 import cloud_pb2 as pb
 

@@ -10,7 +10,7 @@ from typing import Final
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from bridge.values import OutboxError
+from bridge.outbox.errors import OutboxError
 from common.errors import UserError
 from common.private_files import write_private
 

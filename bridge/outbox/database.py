@@ -13,8 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from bridge.events.values import Batch, DropReason, Event, Gap, Item, Position
 from bridge.outbox import commands, meta
 from bridge.outbox.cursor import Cursor, read_cursor, remove_leftovers, write_cursor
+from bridge.outbox.errors import OutboxError
 from bridge.outbox.items import (
     batch_between,
     drop_oldest,
@@ -26,7 +28,6 @@ from bridge.outbox.items import (
     restore,
 )
 from bridge.outbox.schema import TABLES, VERSION
-from bridge.values import Batch, DropReason, Event, Gap, Item, OutboxError, Position
 from common.private_files import make_directory
 
 _log = logging.getLogger(__name__)

@@ -4,8 +4,8 @@ import sqlite3
 from collections.abc import Iterable
 from typing import Any, Final, NamedTuple
 
+from bridge.events.values import Batch, DropReason, Event, Gap, Item
 from bridge.outbox import meta
-from bridge.values import Batch, DropReason, Event, Gap, Item
 
 MOST_ITEMS: Final = 64
 """Of a batch."""

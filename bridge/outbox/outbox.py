@@ -9,8 +9,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
+from bridge.events.values import Batch, Item, Position
 from bridge.outbox.database import Database, Facts
-from bridge.values import Batch, Item, OutboxError, Position
+from bridge.outbox.errors import OutboxError
 from common.broadcast import Broadcast
 
 _log = logging.getLogger(__name__)

@@ -7,9 +7,9 @@ from dataclasses import asdict
 from typing import Any, Final
 
 from bridge.outbox.database import RESERVE_BYTES
+from bridge.outbox.errors import OutboxError
 from bridge.outbox.outbox import Outbox
 from bridge.uploads.queue import MOST_KEPT, Priority, State, Upload
-from bridge.values import OutboxError
 
 _log = logging.getLogger(__name__)
 

@@ -8,12 +8,13 @@ import logging
 from typing import Final
 
 from bridge.config import GatewaySettings
+from bridge.events.values import DropReason, Event, Item
 from bridge.outbox.database import MOST_PROBES
+from bridge.outbox.errors import OutboxError
 from bridge.outbox.items import MOST_BYTES, MOST_ITEMS
 from bridge.outbox.outbox import Outbox
 from bridge.robot.feed import Feed, FeedError
 from bridge.robot.gateway import EVENTS_SILENT_S, events, explained
-from bridge.values import DropReason, Event, Item, OutboxError
 from common.errors import UserError
 from common.jittered_backoff import JitteredBackoff
 from console.client.errors import DeadlineExceeded, GatewayError

@@ -7,7 +7,7 @@ that was taken already is left out.
 import re
 from typing import Final
 
-from bridge.values import DropReason, Event, Gap, Item, Position
+from bridge.events.values import DropReason, Event, Gap, Item, Position
 from omniseer.gateway.v1 import event_pb2, robot_gateway_pb2
 
 MOST_EVENT_BYTES: Final = 64 * 1024

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from bridge.config import GatewaySettings
-from bridge.values import Position
+from bridge.events.values import Position
 from common.errors import UserError
 from common.reasons import Reason
 from console.client.errors import NotAllowed, NotTrusted

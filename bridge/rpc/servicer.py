@@ -8,9 +8,9 @@ import grpc
 
 from bridge.commands.judgement import Upload
 from bridge.commands.pending_requests import Pending, PendingRequests
-from bridge.connection_status import Status
-from bridge.uploading import Uploading
-from bridge.values import OutboxError
+from bridge.connection.connection_status import Status
+from bridge.connection.uploading import Uploading
+from bridge.outbox.errors import OutboxError
 from common.broadcast import HEARTBEAT_S
 from common.errors import InvalidRequestError, TooMuchError
 from common.reasons import Reason

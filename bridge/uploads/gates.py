@@ -6,8 +6,8 @@ from datetime import datetime
 from fnmatch import fnmatchcase
 from typing import Final
 
+from bridge.config import UploadSettings
 from bridge.uploads import hours
-from bridge.uploads.config import UploadSettings
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from datetime import datetime
 from typing import Final
 
-from bridge.uploads.config import UploadSettings
+from bridge.config import UploadSettings
 
 DOUBT: Final = (
     "uploads.time_zone is not set, and this machine or container has no zone but UTC: "

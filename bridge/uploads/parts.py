@@ -26,7 +26,7 @@ from urllib.parse import SplitResult, unquote, urlsplit
 import aiohttp
 from yarl import URL
 
-from bridge.uploads.config import UploadSettings
+from bridge.config import UploadSettings
 from bridge.uploads.gates import wrong_interface
 from bridge.uploads.problems import CutError
 from bridge.uploads.route import interface_of

@@ -23,9 +23,9 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Final
 
+from bridge.config import UploadSettings
 from bridge.uploads import gates
 from bridge.uploads.attempt import Attempt, Parties, RecordingSource, ended
-from bridge.uploads.config import UploadSettings
 from bridge.uploads.gates import Conditions
 from bridge.uploads.kept_queue import KeptQueue
 from bridge.uploads.parts import PartSender

@@ -246,10 +246,10 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("console/receiver/", WIRE),
         *(
             (f"bridge/{name}.py", (*HEAVY, *WIRE, "omniseer", "asyncio", "time", "fleet"))
-            for name in ("values", "lifecycle", "commands/hub_time")
+            for name in ("events/values", "connection/lifecycle", "commands/hub_time")
         ),
         ("bridge/robot/feed.py", ("grpc", "asyncio", "time", "fleet", "bridge.outbox")),
-        ("bridge/robot_state.py", ("grpc", "asyncio", "time", "fleet", "bridge.outbox")),
+        ("bridge/connection/robot_state.py", ("grpc", "asyncio", "time", "fleet", "bridge.outbox")),
         ("bridge/outbox/", (*HEAVY, *WIRE, "omniseer", "fleet", "bridge.robot", "bridge.commands")),
         ("bridge/commands/judgement.py", ("grpc", "asyncio", "time", "fleet.connection", "bridge.outbox")),
     ],

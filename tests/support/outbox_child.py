@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 from typing import Final
 
+from bridge.events.values import Event, Position
 from bridge.outbox.database import Database
-from bridge.values import Event, Position
 
 RUN: Final = "run-1"
 MAX_BYTES: Final = 64 * 1024 * 1024

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
+from bridge.config import UploadSettings
 from bridge.uploads.attempt import RecordingSource
-from bridge.uploads.config import UploadSettings
 from bridge.uploads.kept_queue import KeptQueue
 from bridge.uploads.queue import MOST_KEPT, Upload
 from bridge.uploads.receivers import Requests

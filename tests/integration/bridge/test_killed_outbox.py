@@ -6,8 +6,8 @@ from contextlib import closing
 from pathlib import Path
 from typing import Final
 
+from bridge.events.values import Event, Position
 from bridge.outbox.database import DAMAGED_NAME, Database
-from bridge.values import Event, Position
 from tests.support.outbox_child import MAX_BYTES, RUN
 
 KILLS: Final = 5

@@ -9,11 +9,12 @@ from pathlib import Path
 import pytest
 
 from bridge.config import GatewaySettings
+from bridge.events.values import Event, Item
 from bridge.outbox.cursor import NAME as CURSOR
 from bridge.outbox.database import NAME
+from bridge.outbox.errors import OutboxError
 from bridge.outbox.outbox import Outbox, outbox
 from bridge.robot.events import EventReader
-from bridge.values import Event, Item, OutboxError
 from common.tasks import cancel
 from tests.support.event_server import EventServer
 from tests.support.eventually import eventually

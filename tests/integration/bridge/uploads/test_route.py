@@ -19,7 +19,7 @@ ASK = (
 )
 PUT = """
 import asyncio, json, sys
-from bridge.uploads.config import UploadSettings
+from bridge.config import UploadSettings
 from bridge.uploads.parts import PartSender
 from bridge.uploads.problems import CutError
 

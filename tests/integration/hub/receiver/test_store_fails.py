@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
+from bridge.config import UploadSettings
 from bridge.uploads.attempt import Attempt, Parties
-from bridge.uploads.config import UploadSettings
 from bridge.uploads.parts import PartSender
 from bridge.uploads.problems import AttemptError
 from bridge.uploads.receivers import Receivers

@@ -10,10 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from bridge.events.values import Batch, DropReason, Event, Gap, Item, Position
 from bridge.outbox import commands
 from bridge.outbox.cursor import NAME as CURSOR
 from bridge.outbox.database import DAMAGED_NAME, NAME, RESERVE_BYTES, Database
-from bridge.values import Batch, DropReason, Event, Gap, Item, OutboxError, Position
+from bridge.outbox.errors import OutboxError
 
 RUN = "run-1"
 MIB = 1024 * 1024

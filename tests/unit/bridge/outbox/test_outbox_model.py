@@ -10,8 +10,8 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
+from bridge.events.values import Batch, DropReason, Event, Gap, Item, Position
 from bridge.outbox.database import Database
-from bridge.values import Batch, DropReason, Event, Gap, Item, Position
 
 
 @dataclass

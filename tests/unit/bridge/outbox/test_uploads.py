@@ -8,12 +8,12 @@ import pytest
 from pydantic import ValidationError
 
 from bridge.config import OutboxSettings
+from bridge.connection.uploading import STATES
+from bridge.events.values import Event, Position
 from bridge.outbox.database import Database
 from bridge.outbox.outbox import Outbox, outbox
 from bridge.outbox.uploads import StoredUploads, _row, most_kept
-from bridge.uploading import STATES
 from bridge.uploads.queue import MOST_KEPT, MOST_WAITING, Priority, State, Upload
-from bridge.values import Event, Position
 from omniseer.gateway.v1.recording_pb2 import RecordingCopyState
 
 UPLOAD = Upload(

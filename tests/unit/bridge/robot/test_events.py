@@ -4,8 +4,9 @@ import asyncio
 from typing import Any
 
 from bridge.config import GatewaySettings
+from bridge.events.values import Position
+from bridge.outbox.errors import OutboxError
 from bridge.robot.events import EventReader
-from bridge.values import OutboxError, Position
 from common.tasks import cancel
 from tests.support.virtual_time import in_virtual_time
 

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from bridge.events.values import DropReason, Event, Gap, Item, Position
 from bridge.robot.feed import MOST_EVENT_BYTES, Feed, FeedError
-from bridge.values import DropReason, Event, Gap, Item, Position
 from omniseer.gateway.v1 import event_pb2
 from omniseer.gateway.v1.robot_gateway_pb2 import SubscribeEventsResponse
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from bridge.uploading import QueuedUploads
+from bridge.connection.uploading import QueuedUploads
 from bridge.uploads import kept_queue
 from bridge.uploads.queue import Priority, State, Upload
 from common.errors import NotFoundError, TooMuchError

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from bridge.uploads.config import UploadSettings
+from bridge.config import UploadSettings
 from bridge.uploads.gates import Conditions, closed
 from tests.support.time_zones import local_zone
 

@@ -9,10 +9,9 @@ import pytest
 from typer.testing import CliRunner
 
 from bridge.cli import app
-from bridge.config import BridgeSettings
+from bridge.config import BridgeSettings, UploadSettings
 from bridge.doctor.judgement import hours_findings
 from bridge.uploads import hours, uploads
-from bridge.uploads.config import UploadSettings
 from bridge.uploads.queue import State
 from common.config import load
 from common.errors import UserError

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
+from bridge.config import UploadSettings
 from bridge.uploads.attempt import Attempt, Parties
-from bridge.uploads.config import UploadSettings
 from bridge.uploads.messages import recording_message
 from bridge.uploads.parts import LostError, PartSender
 from bridge.uploads.problems import AttemptError, CutError, RecordingError

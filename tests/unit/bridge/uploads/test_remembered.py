@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
+from bridge.connection.uploading import QueuedUploads
+from bridge.events.values import Event, Position
 from bridge.outbox.outbox import outbox
 from bridge.outbox.uploads import StoredUploads, _row, most_kept
-from bridge.uploading import QueuedUploads
 from bridge.uploads import kept_queue, uploads
 from bridge.uploads.queue import State, Upload
-from bridge.values import Event, Position
 from console.client.results import RecordingCopyState
 from omniseer.gateway.v1.recording_pb2 import RECORDING_COPY_STATE_VERIFIED
 from tests.support.uploading import Robot, Rows, Running, running_uploads

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from bridge.uploading import MOST_COPIES, QueuedUploads, apply_rule
+from bridge.connection.uploading import MOST_COPIES, QueuedUploads, apply_rule
 from bridge.uploads.queue import State, Upload
 from console.client import results
 from console.client.errors import Unreachable

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.uploads.config import UploadSettings
+from bridge.config import UploadSettings
 from bridge.uploads.parts import checked_url
 from bridge.uploads.problems import CutError
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
+from bridge.connection.sender import Sender
+from bridge.events.values import Batch, Event, Position
 from bridge.outbox.database import NAME, Facts
 from bridge.outbox.outbox import outbox
-from bridge.sender import Sender
-from bridge.values import Batch, Event, Position
 from common.broadcast import Broadcast
 from common.tasks import cancel
 from fleet.connection import FleetAddress, Hub, Published

@@ -1,4 +1,4 @@
-"""What the bridge's packages share: events and gaps in their order, and batches of them. Pure values."""
+"""Events and gaps in their order, and batches of them. Pure values."""
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -110,7 +110,3 @@ class Batch:
     def events(self) -> int:
         """Number of events."""
         return sum(isinstance(each, Event) for each in self.items)
-
-
-class OutboxError(Exception):
-    """The outbox can't be read or written; the text says why, for people."""

@@ -4,10 +4,10 @@ import asyncio
 import logging
 import time
 
+from bridge.connection.robot_state import MIN_INTERVAL_S, Own, due_in_s, robot_state, same_but_for_time
+from bridge.connection.uploading import Uploading
 from bridge.outbox.outbox import Outbox
 from bridge.robot.status import StatusReader
-from bridge.robot_state import MIN_INTERVAL_S, Own, due_in_s, robot_state, same_but_for_time
-from bridge.uploading import Uploading
 from common.jittered_backoff import JitteredBackoff
 from common.version import project_version
 from fleet.connection import Hub

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import pytest
 
-from bridge.configured_values import MOST_NUMBERS, MOST_TEXTS
-from bridge.robot_state import Own, robot_state, same_but_for_time
+from bridge.connection.configured_values import MOST_NUMBERS, MOST_TEXTS
+from bridge.connection.robot_state import Own, robot_state, same_but_for_time
 from fleet.reading import LARGEST_STATE
 from omniseer.gateway.v1 import pose_pb2, value_pb2
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus

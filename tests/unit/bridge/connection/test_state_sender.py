@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from bridge import state_sender
+from bridge.connection import state_sender
+from bridge.connection.state_sender import StateSender
+from bridge.connection.uploading import NoUploads
 from bridge.outbox.database import Facts
-from bridge.state_sender import StateSender
-from bridge.uploading import NoUploads
 from fleet.errors import UnreachableError
 from fleet.names import STATES
 from omniseer.fleet.v1.state_pb2 import RobotState

@@ -6,7 +6,7 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import Field, field_validator, model_validator
 from pydantic_settings import SettingsConfigDict
 
-from bridge.uploads.config import UploadSettings
+from bridge.config.uploads import UploadSettings
 from common.config import Section, Settings
 from common.errors import UserError
 from common.socket_path import SocketPath

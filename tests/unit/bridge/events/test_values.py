@@ -1,6 +1,6 @@
 """The bridge's numbers are those of the schema."""
 
-from bridge.values import INFO, DropReason
+from bridge.events.values import INFO, DropReason
 from omniseer.fleet.v1.event_pb2 import DropReason as WireReason
 from omniseer.gateway.v1.fault_pb2 import FAULT_SEVERITY_INFO
 

@@ -4,7 +4,7 @@ from typing import Final
 
 from google.protobuf.message import DecodeError
 
-from bridge.values import Batch, Event, Gap, Item
+from bridge.events.values import Batch, Event, Gap, Item
 from omniseer.fleet.v1 import event_pb2 as pb
 from omniseer.gateway.v1 import event_pb2, fault_pb2
 

@@ -1,8 +1,8 @@
 """The robot at a glance: what it says, and when it is sent."""
 
 from bridge.config import GatewaySettings
+from bridge.connection.robot_state import Own, due_in_s, is_charging, robot_state, same_but_for_time
 from bridge.robot.status import StatusReader
-from bridge.robot_state import Own, due_in_s, is_charging, robot_state, same_but_for_time
 from omniseer.fleet.v1.upload_pb2 import UploadBrief
 from omniseer.gateway.v1 import fault_pb2
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus

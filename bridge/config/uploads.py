@@ -6,7 +6,7 @@ from zoneinfo import ZoneInfo
 
 from pydantic import AfterValidator, Field, model_validator
 
-from bridge.uploads.zones import checked_name
+from bridge.config.zones import checked_name
 from common.config import Section
 from common.text_form import Form
 from fleet.servers import THIS_MACHINE

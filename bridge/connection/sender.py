@@ -13,9 +13,10 @@ import logging
 import time
 from collections.abc import Awaitable, Callable
 
-from bridge.encoding import batch_message, is_whole
+from bridge.events.encoding import batch_message, is_whole
+from bridge.events.values import Event
+from bridge.outbox.errors import OutboxError
 from bridge.outbox.outbox import Outbox
-from bridge.values import Event, OutboxError
 from common.jittered_backoff import JitteredBackoff
 from fleet.connection import Hub, Published
 from fleet.errors import HubError

@@ -2,8 +2,8 @@
 
 import pytest
 
-from bridge.connection_status import STATES
-from bridge.lifecycle import TRANSITIONS, Event, Phase, State, step
+from bridge.connection.connection_status import STATES
+from bridge.connection.lifecycle import TRANSITIONS, Event, Phase, State, step
 
 
 def test_the_table_is_total() -> None:

@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.configured_values import add_values, without_measurements
-from bridge.values import INFO
+from bridge.connection.configured_values import add_values, without_measurements
+from bridge.events.values import INFO
 from omniseer.fleet.v1 import state_pb2 as pb
 from omniseer.fleet.v1.upload_pb2 import UploadBrief
 from omniseer.gateway.v1 import fault_pb2

@@ -4,10 +4,10 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from bridge.lifecycle import Event, Phase, State, step
+from bridge.connection.lifecycle import Event, Phase, State, step
+from bridge.connection.sender import Sender
+from bridge.connection.uploading import Uploading
 from bridge.outbox.outbox import Outbox
-from bridge.sender import Sender
-from bridge.uploading import Uploading
 from common.broadcast import Broadcast
 from fleet.connection import Hub
 from fleet.errors import HubReason

@@ -1,0 +1,1 @@
+"""The robot's connection to its fleet: its state, and the loops between outbox and hub."""
