@@ -21,7 +21,7 @@ from preview.encoders.selection import Selection
 from preview.pipeline.events import HungError
 from preview.pipeline.runner import Runner
 from preview.rpc.servicer import SERVICE, PreviewServicer
-from preview.supervisor import Supervisor
+from preview.supervisor.supervisor import Supervisor
 from preview.tap import VideoTap
 
 _log = logging.getLogger(__name__)

@@ -16,7 +16,7 @@ from typing import Final, NoReturn
 from preview.config import PreviewSettings, RosSource
 from preview.pipeline import sources
 from preview.pipeline.threads import SharedCall
-from preview.supervisor import Supervisor
+from preview.supervisor.supervisor import Supervisor
 
 _log = logging.getLogger(__name__)
 

@@ -27,8 +27,8 @@ from common import bind
 from common.tasks import cancel
 from common.video_tap import Header, Kind, encode_object
 from preview.pipeline.events import AccessUnit
-from preview.supervisor import Supervisor
-from preview.values import RecordedStream
+from preview.state.values import RecordedStream
+from preview.supervisor.supervisor import Supervisor
 
 _log = logging.getLogger(__name__)
 

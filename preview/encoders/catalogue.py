@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
-from preview.values import Codec
+from preview.state.values import Codec
 
 _BIT_PER_S: Final = 1000
 

@@ -13,7 +13,7 @@ from common.gst import GLib, Gst
 from common.trial_child import report
 from preview.encoders import properties
 from preview.encoders.catalogue import CATALOGUE, Encoder
-from preview.values import Target
+from preview.state.values import Target
 
 FRAMES: Final = 10
 _ENOUGH: Final = 8

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from common.gst import GObject, Gst, GstVideo
 from preview.encoders.catalogue import Encoder
-from preview.values import Codec, Target
+from preview.state.values import Codec, Target
 
 _PARSERS: Final = {Codec.H264: "h264parse", Codec.H265: "h265parse"}
 _MEDIA_TYPES: Final = {Codec.H264: "video/x-h264", Codec.H265: "video/x-h265"}

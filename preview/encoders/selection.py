@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Sequence
 from common.errors import UserError
 from preview.encoders.catalogue import Encoder
 from preview.encoders.probe import TrialProber, Verdict
-from preview.values import EncoderChoice
+from preview.state.values import EncoderChoice
 
 
 class Selection:

@@ -9,7 +9,7 @@ from common import trial
 from common.gst import Gst
 from preview.encoders.catalogue import Encoder
 from preview.encoders.probe import Verdict
-from preview.values import Target
+from preview.state.values import Target
 
 
 async def attempt(target: Target, timeout_s: float, encoder: Encoder) -> Verdict:

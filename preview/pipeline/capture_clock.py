@@ -23,7 +23,7 @@ was switched, rebuilt or restarted in between, until the computer restarts.
 from typing import Any, Final
 
 from common.gst import Gst
-from preview.values import CAPTURE_OFFSET_NS
+from preview.state.values import CAPTURE_OFFSET_NS
 
 PTS_WRAP: Final = 1 << 33
 """presentation_time_stamp has 33 bits (ISO/IEC 13818-1 2.4.3.7)."""

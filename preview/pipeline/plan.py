@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from preview.config import PreviewSettings, SrtSettings
 from preview.encoders.catalogue import Encoder
 from preview.pipeline.sources import SourcePlan
-from preview.values import DesiredState, EncoderChoice, Profile, Target
+from preview.state.values import DesiredState, EncoderChoice, Profile, Target
 
 
 @dataclass(frozen=True, slots=True)

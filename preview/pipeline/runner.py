@@ -37,7 +37,7 @@ from preview.pipeline.running import Running
 from preview.pipeline.sources import SourcePlan
 from preview.pipeline.threads import in_thread
 from preview.pipeline.watchdogs import Watchdogs
-from preview.values import Measurement, Profile, StreamState
+from preview.state.values import Measurement, Profile, StreamState
 
 _log = logging.getLogger(__name__)
 

@@ -23,7 +23,7 @@ from preview.config import (
     V4l2Source,
 )
 from preview.pipeline import tap_client
-from preview.values import Target
+from preview.state.values import Target
 
 TAP_SOURCE = "cameratapsrc"
 """Element of preview/pipeline/tap_source.py."""

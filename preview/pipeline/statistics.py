@@ -12,7 +12,7 @@ from preview.pipeline.adaptive import ViewerLink
 from preview.pipeline.framing import Framing
 from preview.pipeline.listener import Listener
 from preview.pipeline.viewer_limit import address_of
-from preview.values import Measurement
+from preview.state.values import Measurement
 
 _ACKNOWLEDGED: Final = "packet-ack-received"
 _SENT: Final = "packets-sent"

@@ -7,11 +7,11 @@ from typing import Final
 
 from common.errors import InvalidRequestError
 from omniseer.preview.v1 import preview_service_pb2 as pb
-from preview.cameras import Camera, CameraState
 from preview.encoders.catalogue import Encoder
 from preview.encoders.probe import Verdict
-from preview.lifecycle import Reason, State
-from preview.values import ActualState, Codec, DesiredState, Profile, StreamState
+from preview.state.cameras import Camera, CameraState
+from preview.state.lifecycle import Reason, State
+from preview.state.values import ActualState, Codec, DesiredState, Profile, StreamState
 
 STATES: Final[Mapping[State, pb.LifecycleState.ValueType]] = MappingProxyType(
     {state: pb.LifecycleState.Value(f"LIFECYCLE_STATE_{state.name}") for state in State}

@@ -11,7 +11,7 @@ from omniseer.preview.v1 import preview_service_pb2_grpc as pb_grpc
 from preview.encoders.catalogue import Encoder
 from preview.encoders.probe import TrialProber
 from preview.rpc import mapping
-from preview.supervisor import Supervisor
+from preview.supervisor.supervisor import Supervisor
 
 SERVICE: Final = pb.DESCRIPTOR.services_by_name["PreviewService"].full_name
 

@@ -182,17 +182,13 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
             (f"gateway/teleop/{name}.py", ("asyncio", "time", "gateway.links"))
             for name in ("lease", "pacing")
         ),
-        ("preview/lifecycle.py", (*HEAVY, *WIRE, "asyncio", "preview")),
-        ("preview/values.py", (*HEAVY, *WIRE, "asyncio", "preview.pipeline", "preview.encoders")),
-        ("preview/config.py", (*HEAVY, *WIRE, "asyncio", "preview.pipeline")),
+        ("preview/state/lifecycle.py", (*HEAVY, *WIRE, "asyncio", "preview")),
+        ("preview/state/values.py", (*HEAVY, *WIRE, "asyncio", "preview.pipeline", "preview.encoders")),
+        ("preview/config/", (*HEAVY, *WIRE, "asyncio", "preview.pipeline")),
         ("preview/encoders/", ("preview.pipeline", "preview.rpc", "preview.supervisor", "preview.config")),
         ("preview/pipeline/", ("preview.rpc", "preview.supervisor", "preview.app")),
-        ("preview/supervisor.py", (*HEAVY, *WIRE, "common.gst", "preview.pipeline.runner", "preview.rpc")),
-        ("preview/cameras.py", (*HEAVY, *WIRE, "asyncio", "time", "preview")),
-        *(
-            (f"preview/{name}.py", (*HEAVY, *WIRE, "common.gst", "preview.pipeline.runner", "preview.rpc"))
-            for name in ("camera_follower", "teardowns")
-        ),
+        ("preview/supervisor/", (*HEAVY, *WIRE, "common.gst", "preview.pipeline.runner", "preview.rpc")),
+        ("preview/state/cameras.py", (*HEAVY, *WIRE, "asyncio", "time", "preview")),
         ("preview/rpc/", ("common.gst",)),
         ("preview/tap.py", (*HEAVY, *WIRE, "common.gst", "omniseer", "preview.rpc", "preview.config")),
         ("common/export_connection.py", (*HEAVY, *WIRE, "common", "asyncio", "time", "socket")),

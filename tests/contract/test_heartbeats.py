@@ -23,7 +23,7 @@ from preview.encoders.crash_marker import CrashMarkerFile
 from preview.encoders.probe import TrialProber, Verdict
 from preview.encoders.selection import Selection
 from preview.rpc.servicer import PreviewServicer
-from preview.supervisor import Supervisor
+from preview.supervisor.supervisor import Supervisor
 from recorder.rpc import mapping
 from recorder.rpc.servicer import RecorderServicer
 from tests.support.pipeline_double import PipelineDoubles

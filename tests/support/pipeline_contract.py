@@ -22,8 +22,8 @@ from preview.pipeline import sources
 from preview.pipeline.events import AccessUnit, Blame, Fault, PipelineEvents
 from preview.pipeline.plan import Plan, make_plan
 from preview.pipeline.sources import SourcePlan
-from preview.ports import Pipeline
-from preview.values import DesiredState, EncoderChoice, Profile, Target
+from preview.state.values import DesiredState, EncoderChoice, Profile, Target
+from preview.supervisor.ports import Pipeline
 from tests.support.eventually import eventually
 from tests.support.free import free_udp_port
 

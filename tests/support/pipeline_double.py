@@ -12,7 +12,7 @@ from common.errors import UserError
 from preview.pipeline.events import AccessUnit, Blame, Fault, HungError, PipelineEvents
 from preview.pipeline.plan import Plan
 from preview.pipeline.sources import SourcePlan
-from preview.values import Measurement, Profile, StreamState
+from preview.state.values import Measurement, Profile, StreamState
 
 FIRST_FRAME_S = 0.05
 SHOW_S = 0.05

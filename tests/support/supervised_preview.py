@@ -14,12 +14,12 @@ from preview.encoders.catalogue import CATALOGUE, Encoder
 from preview.encoders.crash_marker import CrashMarkerFile
 from preview.encoders.probe import TrialProber, Verdict
 from preview.encoders.selection import Selection
-from preview.lifecycle import State
 from preview.pipeline import sources
 from preview.pipeline.events import Blame, Fault, HungError
 from preview.pipeline.sources import SourcePlan
-from preview.supervisor import Supervisor
-from preview.values import ActualState, DesiredState, Profile
+from preview.state.lifecycle import State
+from preview.state.values import ActualState, DesiredState, Profile
+from preview.supervisor.supervisor import Supervisor
 from tests.support.pipeline_double import PipelineDoubles, Script
 
 PROVEN = Verdict(present=True, proven=True, first_byte_ms=5)

@@ -25,7 +25,7 @@ from console.client import PreviewProfile
 from preview.config import PreviewSettings
 from preview.encoders.catalogue import CATALOGUE
 from preview.encoders.properties import configure
-from preview.values import Profile
+from preview.state.values import Profile
 from tests.support.udp_link import Impairment
 from tests.support.undisturbed import no_stall, undisturbed
 

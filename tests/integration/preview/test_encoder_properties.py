@@ -7,7 +7,7 @@ import pytest
 from common.gst import Gst
 from preview.encoders import properties
 from preview.encoders.catalogue import CATALOGUE
-from preview.values import Target
+from preview.state.values import Target
 
 pytestmark = pytest.mark.gst
 

@@ -12,14 +12,14 @@ from preview.encoders.catalogue import CATALOGUE, Encoder
 from preview.encoders.crash_marker import CrashMarkerFile
 from preview.encoders.probe import TrialProber, Verdict
 from preview.encoders.selection import Selection
-from preview.lifecycle import State
 from preview.pipeline import sources
 from preview.pipeline.events import PipelineEvents
 from preview.pipeline.plan import Plan
 from preview.pipeline.runner import Runner
 from preview.pipeline.sources import SourcePlan
-from preview.supervisor import Supervisor
-from preview.values import ActualState, DesiredState, Profile
+from preview.state.lifecycle import State
+from preview.state.values import ActualState, DesiredState, Profile
+from preview.supervisor.supervisor import Supervisor
 from tests.support.pipeline_contract import LIVE, plan_of
 from tests.support.watcher import Watcher
 

@@ -9,7 +9,7 @@ from common.config import as_yaml, load
 from common.errors import UserError
 from preview.config import PreviewSettings, RosSource, TestSource, V4l2Source
 from preview.encoders.catalogue import CATALOGUE, DEFAULT_ORDER
-from preview.values import Codec, Profile
+from preview.state.values import Codec, Profile
 
 
 def from_text(tmp_path: Path, text: str) -> PreviewSettings:

@@ -6,12 +6,12 @@ import pytest
 
 from common.errors import InvalidRequestError
 from omniseer.preview.v1 import preview_service_pb2 as pb
-from preview.cameras import Camera, CameraState
 from preview.encoders.catalogue import CATALOGUE
 from preview.encoders.probe import Verdict
-from preview.lifecycle import Counters, Reason, State
 from preview.rpc import mapping
-from preview.values import ActualState, Codec, EncoderChoice, Measurement, Profile, StreamState, Target
+from preview.state.cameras import Camera, CameraState
+from preview.state.lifecycle import Counters, Reason, State
+from preview.state.values import ActualState, Codec, EncoderChoice, Measurement, Profile, StreamState, Target
 
 FULL = ActualState(
     instance_id="abc",

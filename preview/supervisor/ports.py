@@ -8,7 +8,7 @@ from typing import Protocol
 from preview.pipeline.events import AccessUnit
 from preview.pipeline.plan import Plan
 from preview.pipeline.sources import SourcePlan
-from preview.values import Measurement, Profile, StreamState
+from preview.state.values import Measurement, Profile, StreamState
 
 
 class Pipeline(Protocol):

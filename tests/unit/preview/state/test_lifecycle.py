@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from preview.lifecycle import (
+from preview.state.lifecycle import (
     TRANSITIONS,
     Event,
     IllegalEventError,

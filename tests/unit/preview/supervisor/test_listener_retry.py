@@ -4,8 +4,8 @@ import asyncio
 
 import pytest
 
-from preview.lifecycle import LONGEST_RETRY_S, STEADY_AFTER_S
-from preview.listener_retry import MOST_RETRIES, ListenerRetry
+from preview.state.lifecycle import LONGEST_RETRY_S, STEADY_AFTER_S
+from preview.supervisor.listener_retry import MOST_RETRIES, ListenerRetry
 from tests.support.virtual_time import in_virtual_time
 
 

@@ -60,13 +60,13 @@ from typing import Final
 from common.broadcast import Broadcast
 from common.errors import InvalidRequestError, NotRunningError, UserError
 from common.timer import Timer
-from preview.camera_follower import CameraFollower
 from preview.config import PreviewSettings
 from preview.encoders.catalogue import CATALOGUE
 from preview.encoders.crash_marker import CrashMarkerFile
 from preview.encoders.selection import Selection
-from preview.last_error import LastError
-from preview.lifecycle import (
+from preview.pipeline.events import Blame, Fault, PipelineEvents
+from preview.pipeline.plan import Plan, make_plan
+from preview.state.lifecycle import (
     STEADY_AFTER_S,
     Event,
     Lifecycle,
@@ -75,19 +75,19 @@ from preview.lifecycle import (
     State,
     state_for_viewers,
 )
-from preview.listener_retry import ListenerRetry
-from preview.pipeline.events import Blame, Fault, PipelineEvents
-from preview.pipeline.plan import Plan, make_plan
-from preview.ports import Pipeline, PlanCamera, Recording
-from preview.preparation import Preparation
-from preview.teardowns import Teardowns
-from preview.values import (
+from preview.state.values import (
     CAPTURE_OFFSET_NS,
     ActualState,
     DesiredState,
     EncoderChoice,
     RecordedStream,
 )
+from preview.supervisor.camera_follower import CameraFollower
+from preview.supervisor.last_error import LastError
+from preview.supervisor.listener_retry import ListenerRetry
+from preview.supervisor.ports import Pipeline, PlanCamera, Recording
+from preview.supervisor.preparation import Preparation
+from preview.supervisor.teardowns import Teardowns
 
 _log = logging.getLogger(__name__)
 

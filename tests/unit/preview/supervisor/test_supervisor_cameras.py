@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from common.errors import InvalidRequestError
-from preview.cameras import CameraState
 from preview.config import FileSource, TestSource
-from preview.lifecycle import Counters, State
 from preview.pipeline.events import Blame, Fault
-from preview.values import ActualState, DesiredState, Profile
+from preview.state.cameras import CameraState
+from preview.state.lifecycle import Counters, State
+from preview.state.values import ActualState, DesiredState, Profile
 from tests.support.pipeline_double import FIRST_FRAME_S, SHOW_S, Script
 from tests.support.supervised_preview import BLOCKED, LOOK_S, OFF, SOURCE, STALLED, Preview, now, row
 from tests.support.virtual_time import in_virtual_time

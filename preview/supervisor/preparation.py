@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from preview.encoders.selection import Selection
 from preview.pipeline.sources import SourcePlan
-from preview.ports import PlanCamera
+from preview.supervisor.ports import PlanCamera
 
 _T = TypeVar("_T")
 

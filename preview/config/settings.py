@@ -22,7 +22,7 @@ from common.config import Section, Settings
 from common.socket_path import SocketPath
 from common.text_form import Form
 from preview.encoders.catalogue import CATALOGUE, DEFAULT_ORDER, Encoder
-from preview.values import Codec, Profile, Target
+from preview.state.values import Codec, Profile, Target
 
 MAX_FPS = 120
 MAX_BITRATE_KBPS = 100_000

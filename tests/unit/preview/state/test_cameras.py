@@ -2,8 +2,8 @@
 
 import pytest
 
-from preview import cameras
-from preview.cameras import LONGEST_RETRY_S, STEADY_AFTER_S, Camera, Cameras, CameraState
+from preview.state import cameras
+from preview.state.cameras import LONGEST_RETRY_S, STEADY_AFTER_S, Camera, Cameras, CameraState
 
 ROBOT = {"front": "rear", "rear": "front", "arm": None, "mast": "arm"}
 

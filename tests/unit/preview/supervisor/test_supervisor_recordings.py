@@ -7,9 +7,9 @@ import pytest
 
 from common.errors import NotRunningError
 from preview.config import TimeoutSettings
-from preview.lifecycle import STEADY_AFTER_S, Counters, Reason, State
 from preview.pipeline.events import AccessUnit, Blame, Fault
-from preview.values import ActualState, DesiredState, Profile
+from preview.state.lifecycle import STEADY_AFTER_S, Counters, Reason, State
+from preview.state.values import ActualState, DesiredState, Profile
 from tests.support.pipeline_double import Script
 from tests.support.supervised_preview import AGAIN, ON, PORT, SOURCE, Preview, now, row
 from tests.support.virtual_time import in_virtual_time

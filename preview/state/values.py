@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final
 
-from preview.cameras import Camera
-from preview.lifecycle import Counters, Reason, State
+from preview.state.cameras import Camera
+from preview.state.lifecycle import Counters, Reason, State
 
 CAPTURE_OFFSET_NS: Final = -3_600 * 1_000_000_000
 """Capture time on CLOCK_MONOTONIC minus PTS: mpegtsmux adds an hour (TS_MUX_CLOCK_BASE), so that no DTS is

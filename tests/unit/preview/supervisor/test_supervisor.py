@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from common.errors import NotRunningError
-from preview import supervisor
 from preview.config import FileSource, TimeoutSettings
-from preview.lifecycle import STEADY_AFTER_S, Counters, State
 from preview.pipeline.events import Blame, Fault
-from preview.supervisor import ENCODER_STOP_S, GRAPH
-from preview.values import DesiredState, Profile
+from preview.state.lifecycle import STEADY_AFTER_S, Counters, State
+from preview.state.values import DesiredState, Profile
+from preview.supervisor import supervisor
+from preview.supervisor.supervisor import ENCODER_STOP_S, GRAPH
 from tests.support.pipeline_double import FIRST_FRAME_S, STOP_DEADLINE_S, Script
 from tests.support.supervised_preview import (
     AGAIN,

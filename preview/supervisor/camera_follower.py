@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 
 from common.errors import UserError
 from common.timer import Timer
-from preview.cameras import Camera, Cameras
 from preview.config import PreviewSettings
 from preview.pipeline.events import Blame, Fault
-from preview.ports import Pipeline, PlanCamera
+from preview.state.cameras import Camera, Cameras
+from preview.supervisor.ports import Pipeline, PlanCamera
 
 _log = logging.getLogger(__name__)
 

@@ -14,7 +14,7 @@ from typing import Final
 
 from common.backoff import Backoff
 from common.timer import Timer
-from preview.lifecycle import FIRST_RETRY_S, LONGEST_RETRY_S, STEADY_AFTER_S
+from preview.state.lifecycle import FIRST_RETRY_S, LONGEST_RETRY_S, STEADY_AFTER_S
 
 MOST_RETRIES: Final = 3
 
