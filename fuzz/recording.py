@@ -18,14 +18,14 @@ from mcap.records import Metadata
 from common.errors import DomainError
 from common.video_tap import HEADER_BYTES, MalformedRecordError, decode_header
 from omniseer.gateway.v1 import recording_pb2 as pb
-from recorder.assembly import build
 from recorder.config import RecorderSettings
 from recorder.mcap.reading import summarise
 from recorder.mcap.records import bytes_of
 from recorder.mcap.recovery import recover
 from recorder.mcap.scan import RECORD, new_head
+from recorder.recording.assembly import build
+from recorder.recording.status_reader import StatusReader
 from recorder.rpc.servicer import RecorderServicer
-from recorder.status_reader import StatusReader
 from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason
 from recorder.store.readers import reader_threads
 from recorder.values import Loss, Note, Sample

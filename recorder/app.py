@@ -10,14 +10,14 @@ from pathlib import Path
 from common import bind, heartbeat, rpc
 from common.boot import boot_id
 from common.health import Health
-from recorder.assembly import build
 from recorder.config import RecorderSettings
-from recorder.operations import Operations
-from recorder.recorder import Recorder
+from recorder.recording.assembly import build
+from recorder.recording.operations import Operations
+from recorder.recording.recorder import Recorder
+from recorder.recording.status_reader import StatusReader
 from recorder.rpc.export_connections import ExportConnections
 from recorder.rpc.servicer import SERVICE, RecorderServicer
 from recorder.sources import RobotSources
-from recorder.status_reader import StatusReader
 from recorder.store.lock import folder_lock
 from recorder.store.readers import reader_threads
 from recorder.writing.queue import SampleQueue

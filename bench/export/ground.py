@@ -11,7 +11,7 @@ from bench.export.copying import METHOD, Stream
 from bench.ros_domain import ros_domain
 from console.client import GatewayClient, Recording
 from omniseer.gateway.v1 import recording_pb2 as pb
-from recorder.requests import StartOptions
+from recorder.recording.requests import StartOptions
 from tests.support.gateway_program import GatewayProgram, gateway_program
 from tests.support.recorder_in_process import Source, running_recorder
 from tests.support.running_recorder import RecorderProgram, recorder_program

@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from recorder.offered_qos import OfferedQos, as_yaml
+from recorder.values.offered_qos import OfferedQos, as_yaml
 
 FIRST_DEPTH: Final = 256
 """Before the rate is known: a quarter of a second at 1 kHz."""

@@ -34,9 +34,9 @@ from common.reader_threads import ClosedError
 from common.reasons import Reason
 from common.tasks import first_to_end
 from omniseer.gateway.v1 import recording_pb2 as pb
+from recorder.recording.status_reader import StatusReader
 from recorder.rpc import mapping
 from recorder.rpc.export_connections import ExportConnection, ExportConnections
-from recorder.status_reader import StatusReader
 from recorder.store.bundle_reader import BundleReader
 from recorder.store.export import Content, Export, export
 from recorder.store.readers import Readers

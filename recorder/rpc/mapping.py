@@ -9,9 +9,9 @@ from common.open_file import Chunk
 from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
 from recorder.config import RecorderSettings
-from recorder.lifecycle import State
+from recorder.recording.lifecycle import State
+from recorder.recording.status_reader import StatusReader
 from recorder.rpc.file_pages import FilePage, file_page
-from recorder.status_reader import StatusReader
 from recorder.store.manifest import Copy, CopyState, Kind, Manifest, RecordingState, StopReason
 from recorder.store.run_bundles import Bundle, BundleSummary
 from recorder.values import Gap, GapCause

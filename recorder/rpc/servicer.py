@@ -13,19 +13,19 @@ from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
 from omniseer.recorder.v1 import recorder_service_pb2_grpc as pb_grpc
 from recorder.config import RecorderSettings
-from recorder.operations import Operations
-from recorder.requests import Result, SnapshotOptions, StartOptions
+from recorder.recording.operations import Operations
+from recorder.recording.requests import Result, SnapshotOptions, StartOptions
+from recorder.recording.status_reader import StatusReader
 from recorder.rpc import mapping
 from recorder.rpc.export_connections import ExportConnections
 from recorder.rpc.exporter import Exporter, metadata
 from recorder.rpc.file_pages import file_page
-from recorder.status_reader import StatusReader
+from recorder.rpc.thumbnail import find_thumbnail
 from recorder.store.bundle_reader import BundleReader
 from recorder.store.manifest import Manifest
 from recorder.store.readers import Readers
 from recorder.store.run_bundles import Bundle, BundleSummary, RunBundles
 from recorder.store.sums import Sums
-from recorder.thumbnail import find_thumbnail
 
 SERVICE: Final = recorder_pb.DESCRIPTOR.services_by_name["RecorderService"].full_name
 

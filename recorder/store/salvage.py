@@ -9,10 +9,10 @@ from typing import Final
 from recorder.mcap.records import PART
 from recorder.mcap.recovery import is_untouched, recover
 from recorder.mcap.rosbag2 import metadata
-from recorder.outages import parts_within
 from recorder.store.catalogue import Catalogue, readable, segments_in
 from recorder.store.folder import DATA, METADATA, put_aside, replace_file
 from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason, file_of
+from recorder.store.outages import parts_within
 from recorder.store.ring import Ring, link_next
 from recorder.store.room import is_full
 from recorder.values import Gap, GapCause

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from common.video_tap import Header, Kind, MalformedRecordError, decode_object
-from recorder.offered_qos import OfferedQos, as_yaml
 from recorder.values import VIDEO_TOPIC, Channel, GapCause, Item, Loss, Note, Sample
+from recorder.values.offered_qos import OfferedQos, as_yaml
 from recorder.video import access_unit, message
 from recorder.video.access_unit import Codec
 

@@ -110,7 +110,14 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("drive/", ("omniseer.gateway", "grpc", "asyncio")),
         ("preview/", ("omniseer.gateway",)),
         ("console/", ("omniseer.preview",)),
-        ("recorder/values.py", (*HEAVY, *WIRE, "omniseer", "asyncio", "time", "mcap", "recorder")),
+        (
+            "recorder/values/",
+            (
+                *(*HEAVY, *WIRE, "omniseer", "asyncio", "time", "mcap"),
+                *("recorder.config", "recorder.intake", "recorder.mcap", "recorder.recording"),
+                *("recorder.rpc", "recorder.store", "recorder.video", "recorder.writing"),
+            ),
+        ),
         ("recorder/intake/", (*WIRE, "omniseer", "asyncio", "mcap", "recorder.mcap", "recorder.config")),
         ("recorder/mcap/", (*HEAVY, *WIRE, "omniseer", "asyncio", "recorder.intake", "recorder.config")),
         ("recorder/video/", (*HEAVY, *WIRE, "omniseer", "mcap", "recorder.intake", "recorder.mcap")),
@@ -120,35 +127,31 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ),
         (
             "recorder/store/",
-            (*HEAVY, *WIRE, "omniseer", "mcap", "recorder.intake", "recorder.rpc", "recorder.recorder"),
+            (*HEAVY, *WIRE, "omniseer", "mcap", "recorder.intake", "recorder.rpc", "recorder.recording"),
         ),
         ("recorder/store/retention.py", ("asyncio", "time", "os", "pathlib", "recorder")),
         ("recorder/writing/", (*HEAVY, *WIRE, "omniseer", "asyncio", "recorder.intake", "recorder.store")),
         *(
             (f"recorder/{name}.py", (*HEAVY, *WIRE, "omniseer", "asyncio", "time", "recorder"))
-            for name in ("lifecycle", "incidents", "offered_qos")
+            for name in ("recording/lifecycle", "recording/incidents", "values/offered_qos")
         ),
-        ("recorder/config.py", (*HEAVY, *WIRE, "asyncio", "recorder")),
+        ("recorder/config/settings.py", (*HEAVY, *WIRE, "asyncio", "recorder")),
+        ("recorder/recording/", (*HEAVY, *WIRE, "omniseer", "recorder.intake", "recorder.rpc")),
         *(
-            (f"recorder/{name}.py", (*HEAVY, *WIRE, "omniseer", "recorder.intake", "recorder.rpc"))
-            for name in (
-                "lifecycle_runner",
-                "manual_recorder",
-                "operations",
-                "outputs",
-                "assembly",
-                "status_reader",
-                "recorder",
-                "reports",
-                "ring_recorder",
-                "snapshots",
+            (
+                f"recorder/recording/{name}.py",
+                (
+                    "recorder.recording.assembly",
+                    "recorder.recording.recorder",
+                    "recorder.recording.ring_recorder",
+                ),
             )
-        ),
-        *(
-            (f"recorder/{name}.py", ("recorder.assembly", "recorder.recorder", "recorder.ring_recorder"))
             for name in ("manual_recorder", "snapshots")
         ),
-        ("recorder/status_reader.py", ("recorder.recorder", "recorder.operations")),
+        (
+            "recorder/recording/status_reader.py",
+            ("recorder.recording.recorder", "recorder.recording.operations"),
+        ),
         ("gateway/status/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config", "asyncio")),
         ("gateway/access/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config")),
         ("gateway/ros/", ("gateway.rpc", "gateway.links", *WIRE)),
@@ -292,7 +295,7 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
         ("botocore", ("hub/receiver/",)),
         ("aiohttp", ("bridge/uploads/",)),
         ("cryptography", ("common/ca.py",)),
-        ("yaml", ("common/config.py", "recorder/offered_qos.py", "recorder/mcap/rosbag2.py")),
+        ("yaml", ("common/config.py", "recorder/values/offered_qos.py", "recorder/mcap/rosbag2.py")),
         ("zeroconf", ("gateway/platform/advertiser.py", "console/robots/discovery.py")),
         ("google_crc32c", ("console/client/file_stream.py", "common/open_file.py")),
         ("tomlkit", ("console/robots/robots_file_edit.py",)),

@@ -10,8 +10,8 @@ import time
 from pathlib import Path
 from typing import Final
 
-from recorder.lifecycle import State
-from recorder.requests import StartOptions
+from recorder.recording.lifecycle import State
+from recorder.recording.requests import StartOptions
 from tests.support.recorder_in_process import Source, running_recorder
 
 _PERIOD_S: Final = 0.002

@@ -9,13 +9,13 @@ from pathlib import Path
 from random import randbytes
 from typing import Any, Final
 
-from recorder.assembly import build
 from recorder.config import RecorderSettings
-from recorder.lifecycle import State
 from recorder.mcap.reading import messages
-from recorder.operations import Operations
-from recorder.recorder import Recorder
-from recorder.status_reader import StatusReader
+from recorder.recording.assembly import build
+from recorder.recording.lifecycle import State
+from recorder.recording.operations import Operations
+from recorder.recording.recorder import Recorder
+from recorder.recording.status_reader import StatusReader
 from recorder.store.folder import make_directory
 from recorder.store.manifest import Manifest
 from recorder.values import Channel, Sample

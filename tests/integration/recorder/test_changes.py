@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from recorder.requests import StartOptions
+from recorder.recording.requests import StartOptions
 from tests.support.recorder_in_process import Running, Source, running_recorder
 
 IDLE_S = 0.8

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from recorder.lifecycle import State
 from recorder.mcap.reading import messages
-from recorder.requests import StartOptions
+from recorder.recording.lifecycle import State
+from recorder.recording.requests import StartOptions
 from recorder.values import Item, Sample
 from recorder.writing.output import Output
 from recorder.writing.writer import FLUSH_S, WriterEndedError

@@ -21,10 +21,10 @@ from common.errors import (
     TooMuchError,
     UserError,
 )
-from recorder import ring_recorder
-from recorder.lifecycle import State
 from recorder.mcap.writer import SegmentWriter
-from recorder.requests import SnapshotOptions, StartOptions
+from recorder.recording import ring_recorder
+from recorder.recording.lifecycle import State
+from recorder.recording.requests import SnapshotOptions, StartOptions
 from recorder.store.folder import replace_file
 from recorder.store.lock import folder_lock
 from recorder.store.manifest import Copy, CopyState, Kind, Manifest, RecordingState, StopReason
@@ -849,7 +849,7 @@ async def test_a_deletion_that_the_disk_refuses_says_so(
 async def test_a_stop_that_takes_long_names_the_recording_that_it_stops(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("recorder.operations._STOP_WAIT_S", 0.05)
+    monkeypatch.setattr("recorder.recording.operations._STOP_WAIT_S", 0.05)
     async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
         await running.until(lambda: running.status_reader.writes)
         await running.operations.start("1", StartOptions())

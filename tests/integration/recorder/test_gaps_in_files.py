@@ -4,8 +4,8 @@ from pathlib import Path
 
 from mcap.reader import make_reader
 
-from recorder.lifecycle import State
-from recorder.requests import SnapshotOptions, StartOptions
+from recorder.recording.lifecycle import State
+from recorder.recording.requests import SnapshotOptions, StartOptions
 from recorder.store.manifest import Manifest, RecordingState
 from recorder.values import Gap, GapCause
 from tests.support.recorder_in_process import Running, Source, running_recorder

@@ -8,8 +8,8 @@ from typing import Final
 
 import pytest
 
-from recorder import ring_recorder, snapshots
-from recorder.requests import SnapshotOptions
+from recorder.recording import ring_recorder, snapshots
+from recorder.recording.requests import SnapshotOptions
 from recorder.store.manifest import Kind, Manifest, RecordingState
 from tests.support.recorder_in_process import Running, Source, numbers, running_recorder
 

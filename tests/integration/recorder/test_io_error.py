@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import PreconditionError
-from recorder.requests import StartOptions
+from recorder.recording.requests import StartOptions
 from recorder.store.manifest import RecordingState, StopReason
 from tests.support.recorder_in_process import Source, running_recorder
 

@@ -13,7 +13,7 @@ from typing import Final
 
 import pytest
 
-from recorder.lifecycle import State
+from recorder.recording.lifecycle import State
 from recorder.store.manifest import RecordingState
 from recorder.values import GapCause
 from tests.support.promise import keeps_async

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from recorder.requests import StartOptions
+from recorder.recording.requests import StartOptions
 from recorder.store.manifest import Manifest, StopReason
 from recorder.values import VIDEO_TOPIC, GapCause, Loss
 from tests.support.recorder_in_process import Running, Source, channel, running_recorder
@@ -20,7 +20,7 @@ MINUTE_NS = 60 * 1_000_000_000
 
 @pytest.fixture(autouse=True)
 def _of_any_length(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("recorder.manual_recorder._MEASURED_S", 0.0)
+    monkeypatch.setattr("recorder.recording.manual_recorder._MEASURED_S", 0.0)
 
 
 async def recorded(running: Running, request_id: str, *, with_video: bool, frames: int = 0) -> Manifest:

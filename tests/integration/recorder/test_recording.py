@@ -13,9 +13,9 @@ import yaml
 from rosbags.rosbag2 import Reader
 
 from common.errors import InvalidRequestError, NotFoundError, PreconditionError
-from recorder.lifecycle import State
-from recorder.requests import SnapshotOptions, StartOptions
-from recorder.status_reader import NEWEST_ENDED
+from recorder.recording.lifecycle import State
+from recorder.recording.requests import SnapshotOptions, StartOptions
+from recorder.recording.status_reader import NEWEST_ENDED
 from recorder.store.folder import new_id
 from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason
 from recorder.values import Ended, GapCause, Loss

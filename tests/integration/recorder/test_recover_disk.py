@@ -9,8 +9,8 @@ from typer.testing import CliRunner
 from common.errors import UserError
 from recorder.cli import app
 from recorder.mcap.reading import summarise
+from recorder.recording.requests import StartOptions
 from recorder.recover_disk import recover_below
-from recorder.requests import StartOptions
 from recorder.store.folder import SEGMENT
 from recorder.store.lock import folder_lock
 from recorder.store.manifest import Manifest, RecordingState, StopReason

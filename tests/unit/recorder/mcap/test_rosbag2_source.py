@@ -14,8 +14,8 @@ from mcap.reader import make_reader
 from recorder.mcap.recovery import recover
 from recorder.mcap.rosbag2 import metadata
 from recorder.mcap.writer import SegmentWriter
-from recorder.offered_qos import OfferedQos, as_yaml
 from recorder.values import VIDEO_TOPIC, GapCause, Loss, Note, SegmentSummary
+from recorder.values.offered_qos import OfferedQos, as_yaml
 from recorder.video.stream import channel as video_channel
 from tests.support.segments import BYTE, STRING, string_sample
 

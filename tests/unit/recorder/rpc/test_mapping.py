@@ -8,12 +8,12 @@ import pytest
 
 from common.errors import InvalidRequestError
 from omniseer.gateway.v1 import recording_pb2 as pb
-from recorder.requests import Live
+from recorder.recording.requests import Live
 from recorder.rpc import mapping
 from recorder.store.manifest import Copy, CopyState, Kind, Manifest, RecordingState
 
 if TYPE_CHECKING:
-    from recorder.status_reader import StatusReader
+    from recorder.recording.status_reader import StatusReader
 
 
 @pytest.mark.parametrize(

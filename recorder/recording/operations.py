@@ -14,11 +14,11 @@ from common.errors import (
     TooMuchError,
 )
 from common.reasons import Reason
-from recorder.assembly import Parts
-from recorder.lifecycle import Event, State
-from recorder.recorder import Recorder
-from recorder.requests import Result, SnapshotOptions, StartOptions
-from recorder.status_reader import StatusReader
+from recorder.recording.assembly import Parts
+from recorder.recording.lifecycle import Event, State
+from recorder.recording.recorder import Recorder
+from recorder.recording.requests import Result, SnapshotOptions, StartOptions
+from recorder.recording.status_reader import StatusReader
 from recorder.store.folder import new_id
 from recorder.store.housekeeping import attempt
 from recorder.store.manifest import Copy, Kind, Manifest, RecordingState, StopReason

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Final
 
 from recorder.config import RecorderSettings
-from recorder.outages import Outages
-from recorder.outputs import Outputs
-from recorder.retries import Retries
-from recorder.snapshots import Snapshots
+from recorder.recording.outputs import Outputs
+from recorder.recording.retries import Retries
+from recorder.recording.snapshots import Snapshots
 from recorder.store.housekeeping import attempt
+from recorder.store.outages import Outages
 from recorder.store.ring import SEGMENT_S, Ring, RingSegment
 from recorder.values import GapCause
 from recorder.writing.output import Closed, Output, Shape

@@ -4,8 +4,8 @@ import asyncio
 import logging
 
 from common.broadcast import Broadcast
-from recorder.lifecycle import Event, Phase, State, step
-from recorder.retries import Retries
+from recorder.recording.lifecycle import Event, Phase, State, step
+from recorder.recording.retries import Retries
 
 _log = logging.getLogger(__name__)
 

@@ -7,9 +7,9 @@ from typing import Final
 from common.broadcast import Broadcast
 from common.errors import NotFoundError
 from common.reasons import Reason
-from recorder.assembly import Parts
-from recorder.lifecycle import Phase
-from recorder.requests import Live
+from recorder.recording.assembly import Parts
+from recorder.recording.lifecycle import Phase
+from recorder.recording.requests import Live
 from recorder.store.housekeeping import LEAST_ROOM, Room
 from recorder.store.manifest import Manifest
 from recorder.values import Losses

@@ -10,13 +10,13 @@ from typing import Any, Final
 from common.errors import InvalidRequestError, PreconditionError, TooMuchError
 from common.reasons import Reason
 from recorder.config import RecorderSettings
-from recorder.incidents import SEVERITIES, Incidents, Rules
-from recorder.outages import Outages
-from recorder.outputs import Outputs
+from recorder.recording.incidents import SEVERITIES, Incidents, Rules
+from recorder.recording.outputs import Outputs
 from recorder.store.catalogue import Catalogue
 from recorder.store.folder import new_id
 from recorder.store.housekeeping import LEAST_ROOM, Housekeeping, attempt
 from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason
+from recorder.store.outages import Outages
 from recorder.store.ring import Ring, RingSegment, link_next
 from recorder.store.salvage import ended
 from recorder.values import Gap, GapCause

@@ -1,6 +1,6 @@
 """When the ring was not written."""
 
-from recorder.outages import Outages
+from recorder.store.outages import Outages
 from recorder.values import Gap, GapCause
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from recorder.lifecycle import Event, IllegalEventError, Phase, State, step
+from recorder.recording.lifecycle import Event, IllegalEventError, Phase, State, step
 
 # Written out once more, from the design: the table must not be its own judge.
 EXPECTED = {

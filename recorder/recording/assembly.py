@@ -3,15 +3,15 @@
 from dataclasses import dataclass
 
 from recorder.config import RecorderSettings
-from recorder.lifecycle_runner import LifecycleRunner
-from recorder.manual_recorder import ManualRecorder
-from recorder.outages import Outages
-from recorder.outputs import Outputs, Sources
-from recorder.reports import Reports
-from recorder.ring_recorder import RingRecorder
-from recorder.snapshots import Snapshots
+from recorder.recording.lifecycle_runner import LifecycleRunner
+from recorder.recording.manual_recorder import ManualRecorder
+from recorder.recording.outputs import Outputs, Sources
+from recorder.recording.reports import Reports
+from recorder.recording.ring_recorder import RingRecorder
+from recorder.recording.snapshots import Snapshots
 from recorder.store.catalogue import Catalogue
 from recorder.store.housekeeping import Housekeeping
+from recorder.store.outages import Outages
 from recorder.store.ring import Ring
 from recorder.store.room import Reserve
 from recorder.store.state_file import StateFile

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Final
 
 from recorder.config import RecorderSettings
-from recorder.lifecycle import Event, State
-from recorder.lifecycle_runner import LifecycleRunner
-from recorder.outputs import Outputs, Sources
-from recorder.requests import Live
+from recorder.recording.lifecycle import Event, State
+from recorder.recording.lifecycle_runner import LifecycleRunner
+from recorder.recording.outputs import Outputs, Sources
+from recorder.recording.requests import Live
 from recorder.store.catalogue import Catalogue, first_free_number
 from recorder.store.folder import DATA, segment_name
 from recorder.store.housekeeping import attempt

@@ -1,6 +1,6 @@
 """Which faults make an incident."""
 
-from recorder.incidents import Incidents, Rules
+from recorder.recording.incidents import Incidents, Rules
 
 
 def test_severity_switch_and_list_decide() -> None:

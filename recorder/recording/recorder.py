@@ -6,11 +6,11 @@ import time
 from collections.abc import Callable, Collection
 from typing import Final, Literal
 
-from recorder.assembly import Parts
-from recorder.lifecycle import Event, State
-from recorder.reports import Failed, Finished
-from recorder.retries import Retries
-from recorder.status_reader import StatusReader
+from recorder.recording.assembly import Parts
+from recorder.recording.lifecycle import Event, State
+from recorder.recording.reports import Failed, Finished
+from recorder.recording.retries import Retries
+from recorder.recording.status_reader import StatusReader
 from recorder.store.housekeeping import LEAST_ROOM, attempt
 from recorder.store.manifest import Manifest, RecordingState, StopReason
 from recorder.store.room import is_full

@@ -1,6 +1,6 @@
 """Pauses between attempts at what the disk fails."""
 
-from recorder.retries import FIRST_S, LONGEST_S, Retries
+from recorder.recording.retries import FIRST_S, LONGEST_S, Retries
 from tests.support.clock import Clock
 
 
