@@ -4,8 +4,6 @@ from collections.abc import Collection
 from enum import Enum
 from typing import Final, NamedTuple
 
-from console.client.results import DriveLimits, Supervision
-
 
 class Steering(NamedTuple):
     """Shares of the permitted velocity, each from -1 to 1, in the robot's frame (REP 103)."""
@@ -49,7 +47,7 @@ def steering_of(down: Collection[Direction]) -> Steering | None:
 
 
 class Speeds(NamedTuple):
-    """What a share of 1 stands for."""
+    """What a share of 1 stands for; at the most what `DriveLimits.permitted` returns."""
 
     vx_mps: float
     vy_mps: float
@@ -62,14 +60,3 @@ class Speeds(NamedTuple):
             steering.left * self.vy_mps,
             steering.turn * self.wz_rad_s,
         )
-
-
-def permitted(limits: DriveLimits, supervision: Supervision) -> Speeds:
-    """Returns the largest velocities that the robot accepts; what the picture's age permits may be less."""
-    if supervision is not Supervision.LINE_OF_SIGHT:
-        return Speeds(limits.max_vx_mps, limits.max_vy_mps, limits.max_wz_rad_s)
-    return Speeds(
-        min(limits.max_vx_mps, limits.line_of_sight_mps),
-        min(limits.max_vy_mps, limits.line_of_sight_mps),
-        min(limits.max_wz_rad_s, limits.line_of_sight_rad_s),
-    )

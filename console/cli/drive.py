@@ -25,7 +25,7 @@ from console.client import (
 )
 from console.client.results import TeleopAnswer, TeleopState
 from console.presentation.json_form import json_form
-from console.steering import Speeds, permitted
+from console.steering import Speeds
 
 _TICK_S: Final = 0.02
 _LAST_CALLS_S: Final = 2.0
@@ -145,7 +145,7 @@ class _Cockpit:
         self._client = client
         self._driving = driving
         self._controls = controls
-        most = permitted(limits, Supervision.LINE_OF_SIGHT)
+        most = Speeds(*limits.permitted(Supervision.LINE_OF_SIGHT))
         speed_mps, turn_rad_s = speeds
         self._speeds = Speeds(speed_mps or most.vx_mps, speed_mps or most.vy_mps, turn_rad_s or most.wz_rad_s)
         self._shown: object = None

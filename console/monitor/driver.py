@@ -23,7 +23,7 @@ from console.monitor.calls import Calls
 from console.monitor.notes import Notes
 from console.presentation.preview_switch import Note
 from console.presentation.severity_style import SeverityStyle
-from console.steering import Steering, permitted
+from console.steering import Speeds, Steering
 
 _STOPS_END_WITHIN_S: Final = 0.5
 """How long a window that is closed waits for the confirmation of a stop."""
@@ -152,7 +152,7 @@ class Driver:
         """Holds, for 100 ms; no-op without a session."""
         session, options = self._session, self._options
         if session and options and session.limits:
-            speeds = permitted(session.limits, options.supervision)
+            speeds = Speeds(*session.limits.permitted(options.supervision))
             session.hold(*speeds.velocity(steering), input_device=input_device)
 
     def release(self) -> None:

@@ -9,7 +9,7 @@ from console.client.drive_reasons import rest_reasons
 from console.client.results import DriveLimits, Teleop, TeleopState
 from console.presentation.formatting import joined, sentence
 from console.presentation.severity_style import DRIVE_STYLES, SeverityStyle
-from console.steering import permitted
+from console.steering import Speeds
 
 LATE_S: Final = 0.4
 """Silence of the robot after which it stops its driver (LOOP_LATE, docs/driving.md)."""
@@ -127,7 +127,7 @@ def own_display(
 
 
 def _bars(state: DriveState, limits: DriveLimits, supervision: Supervision) -> list[SpeedBar]:
-    most = permitted(limits, supervision)
+    most = Speeds(*limits.permitted(supervision))
     now_mps = state.speed_limit_mps
     bars = [SpeedBar("forward", "m/s", state.vx_mps, limits.max_vx_mps, min(most.vx_mps, now_mps))]
     if limits.max_vy_mps:

@@ -240,7 +240,7 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
             (f"console/gamepad/{name}.py", ("sdl2", "ctypes", "time", "threading"))
             for name in ("shaping", "hands")
         ),
-        ("console/steering.py", (*HEAVY, *WIRE, "asyncio", "time")),
+        ("console/steering.py", (*HEAVY, *WIRE, "asyncio", "time", "console")),
         ("console/window/", ("console.cli",)),
         ("console/receiver/", WIRE),
         *(

@@ -84,6 +84,19 @@ class DriveLimits:
     line_of_sight_mps: float
     line_of_sight_rad_s: float
 
+    def permitted(self, supervision: Supervision) -> tuple[float, float, float]:
+        """Returns the largest vx and vy in m/s, and turning rate in rad/s, that the robot accepts.
+
+        What the picture's age permits may be less.
+        """
+        if supervision is not Supervision.LINE_OF_SIGHT:
+            return self.max_vx_mps, self.max_vy_mps, self.max_wz_rad_s
+        return (
+            min(self.max_vx_mps, self.line_of_sight_mps),
+            min(self.max_vy_mps, self.line_of_sight_mps),
+            min(self.max_wz_rad_s, self.line_of_sight_rad_s),
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveOpened:

@@ -9,7 +9,7 @@ from console.client.results import Teleop, TeleopState
 from console.presentation.drive_display import LATE_S, own_display, watched_display
 from console.presentation.severity_style import SeverityStyle
 from tests.support.snapshots import snapshot
-from tests.unit.console.test_steering import LIMITS
+from tests.unit.console.client.results.test_driving import LIMITS
 
 STATE = DriveState(
     monotonic_ns=1,
