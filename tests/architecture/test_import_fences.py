@@ -2,9 +2,11 @@
 
 import ast
 import re
+import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
+from graphlib import CycleError, TopologicalSorter
 from itertools import groupby
 from pathlib import Path
 
@@ -345,18 +347,28 @@ def test_a_foreign_library_has_one_home(library: str, homes: tuple[str, ...]) ->
     assert not strangers
 
 
-@pytest.mark.parametrize("program", OURS)
-def test_a_programs_folders_do_not_import_each_other_in_circles(program: str) -> None:
+def test_folders_do_not_import_each_other_in_circles() -> None:
+    """The files at a program's root are one part, and each folder below it is another."""
+    try:
+        TopologicalSorter(imported_folders()).prepare()
+    except CycleError as error:
+        pytest.fail(" imports ".join(reversed(error.args[1])))
+
+
+def test_the_rules_are_for_all_packages_of_the_product() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    packages = project["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]
+    assert {each for each in packages if not each.startswith("proto/")} == set(OURS)
+
+
+def imported_folders() -> dict[str, set[str]]:
+    """The folders that the files of each folder import, but for itself."""
     imported: dict[str, set[str]] = {}
-    statements = groupby(imports_below(program), key=lambda found: (found.importer, found.line))
-    for (importer, _), found in statements:
-        home = home_of(importer)
-        others = imported.setdefault(home, set())
-        others |= {home_of(file) for file in imported_files({each.module for each in found})} - {home}
-    while leaves := {home for home, others in imported.items() if not others & imported.keys()}:
-        for leaf in leaves:
-            del imported[leaf]
-    assert not imported, "each of these is part of a circle, or imports one"
+    for (importer, _), found in groupby(imports(), key=lambda found: (found.importer, found.line)):
+        folder = str(Path(importer).parent)
+        files = imported_files({each.module for each in found})
+        imported.setdefault(folder, set()).update({str(Path(file).parent) for file in files} - {folder})
+    return imported
 
 
 def imported_files(modules: set[str]) -> Iterator[str]:
@@ -372,16 +384,12 @@ def imported_files(modules: set[str]) -> Iterator[str]:
             yield file
 
 
-def home_of(file: str) -> str:
-    """The file's folder; a file beside a program's folders, as that of its settings, is a home of its own."""
-    folder = str(Path(file).parent)
-    return file if folder in OURS else folder
-
-
 def test_the_fence_sees_what_it_should() -> None:
     """A fence that reads no imports would let everything through."""
     assert offenders("common/gst.py", ("gi",))
     assert len({found.importer for found in imports()}) > 20
+    assert "gateway/status" in imported_folders()["gateway"]
+    assert "console/client/results" in imported_folders()["console/client"]
 
 
 def test_our_programs_take_the_names_of_their_nodes_from_one_list() -> None:
