@@ -70,7 +70,7 @@ class Kind(IntEnum):
 
     FRAME = 0
     PROBLEM = 1
-    """Text for people: why no frames come, or not all; empty when that is over."""
+    """Text for people: why no frames come, or not all; empty once they come again."""
     STATUS = 2
     """JSON object: the state of the tap."""
 

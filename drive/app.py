@@ -77,7 +77,7 @@ def work(settings: DriveSettings) -> None:
     """
     rules = settings.rules
     stops = worker_stops()
-    # Whether anyone may drive is the gateway's to say; until it does, there is no driver.
+    # Whether driving is enabled is the gateway's to say; until it does, there is no driver.
     state = State.at_start(time.monotonic_ns(), enabled=False, latch=stops.latch, last_stop_id=stops.last_id)
     with (
         worker_heartbeats() as heartbeats,

@@ -90,7 +90,7 @@ def confirmed(signed: SignedReceipt, public_keys: Sequence[bytes], expected: Rec
     """Returns a receipt that one of the keys has signed and that confirms what is expected.
 
     Args:
-        signed: From anyone.
+        signed: Of unknown origin.
         public_keys: Of the fleet's receivers.
         expected: With fleet, robot, recording_id, file_name, size and sha256.
 

@@ -37,7 +37,7 @@ def opened(signed: SignedReceipt, public_keys: Iterable[bytes]) -> Receipt | Rec
     """Returns what a receiver confirms, if the signature is that of one of the keys (RFC 8032 5.1.7).
 
     Args:
-        signed: From anyone.
+        signed: Of unknown origin.
         public_keys: Of the fleet's receivers, 32 bytes each.
     """
     if not signed.receipt:

@@ -122,8 +122,8 @@ def _figure(name: str, said: str) -> int:
 def last_words(said: str) -> str:
     """The exception, else libFuzzer's own line, else whatever came last."""
     lines = [line for line in said.splitlines() if line.strip()]
-    telling = [line for line in lines if re.match(r"^(\w+Error|\w+Exception|==\d+== ?ERROR)", line)]
-    return (telling or lines[-1:] or ["it ended without a word"])[0][:200]
+    errors = [line for line in lines if re.match(r"^(\w+Error|\w+Exception|==\d+== ?ERROR)", line)]
+    return (errors or lines[-1:] or ["it ended without a word"])[0][:200]
 
 
 def _arguments() -> argparse.Namespace:

@@ -10,8 +10,8 @@ current_tag() {
   echo "${named:-latest}"
 }
 
-# In .env, as one change: a power cut leaves the old file or the new one. It stays its owner's, whoever upgrades, and a
-# link stays one.
+# In .env, as one change: a power cut leaves the old file or the new one. The file keeps its owner, and a link stays a
+# link.
 set_tag() {
   local env new
   env=$(realpath --canonicalize-missing "$robot/.env")

@@ -89,7 +89,7 @@ class Connection:
 
     @property
     def has_ended(self) -> bool:
-        """Whether the connection is over."""
+        """Whether the connection has ended."""
         return not self._thread.is_alive()
 
     def close(self) -> None:

@@ -60,7 +60,7 @@ def _gateway(minutes: float) -> list[Row]:
 
 
 def _readings(once: Callable[[], None], pid: int, minutes: float) -> list[Reading]:
-    """Runs rounds until the time is over, at least as many as a judgement needs; reads after each."""
+    """Runs rounds until the time has passed, at least as many as a judgement needs; reads after each."""
     until_s = time.monotonic() + minutes * 60
     readings: list[Reading] = []
     while time.monotonic() < until_s or len(readings) < FEWEST_ROUNDS:

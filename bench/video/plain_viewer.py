@@ -1,4 +1,4 @@
-"""A receiver as anyone would write it with GStreamer: a pipeline, decoded frames out of an appsink."""
+"""A receiver of the simplest kind with GStreamer: a pipeline, decoded frames out of an appsink."""
 
 import time
 from functools import partial

@@ -79,7 +79,7 @@ class PendingRequests:
         return command_id in self._pending
 
     async def add(self, request: Request) -> Pending | None:
-        """Adds a request, remembered on the disk before anyone sees it. Returns None if it is known already.
+        """Adds a request, on the disk before it is handed over. Returns None if it is known already.
 
         Raises:
             OutboxError: it is not added.

@@ -220,7 +220,7 @@ class Lanes:
                 await self._serve(transport, lane)
             except GatewayError as error:
                 # Where the gateway ends a call while a command is written, gRPC's asyncio client makes up an
-                # internal error. To join the session again has the gateway say why, if it is over.
+                # internal error. If the session has ended, the gateway says why when it is joined again.
                 made_up = isinstance(error, GatewayFailed) and backoff.failures < _REJOINS
                 # One that has no room for another lane, or takes this one for open still, keeps the session.
                 refused = isinstance(error, Refused) and not isinstance(error, Overloaded)

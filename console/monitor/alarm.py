@@ -51,7 +51,7 @@ class Alarm:
         alarming = [fault for fault in faults if fault.active and fault.severity in _RANKS]
         active = {occurrence(fault): _RANKS[fault.severity] for fault in alarming}
         self._active = active | ({LOST_LINK: _RANKS[FaultSeverity.ERROR]} if link_lost else {})
-        # One that became less severe was acknowledged as that: the next rise is news again.
+        # One that became less severe was acknowledged as that: the next rise alarms again.
         self._acknowledged = {
             each: min(rank, self._active[each])
             for each, rank in self._acknowledged.items()

@@ -32,7 +32,7 @@ def parse_login_text(
     """Returns the content of a text of at most 64 KiB; None if it does not begin as such a login.
 
     Args:
-        text: From anyone.
+        text: Of unknown origin.
         head: The first line.
         words: Keys of values. Lines with other keys are left out.
         blocks: Keys of blocks.

@@ -1,4 +1,4 @@
-"""State of the recorder over the picture: that it records, and disk trouble before it bites."""
+"""State of the recorder over the picture: that it records, and that the disk fills or fails."""
 
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 

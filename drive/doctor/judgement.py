@@ -77,7 +77,7 @@ def _mux_input(topic: TopicFacts) -> Iterator[Finding]:
         yield note(
             f"{check}.shared",
             f"{', '.join(topic.publishers)} publishes on {topic.name}, too",
-            "The multiplexer can't tell the two apart: a zero of one does not stop the other",
+            "The multiplexer can't distinguish the two: a zero of one does not stop the other",
             "Give robot-drive an input of its own",
         )
 

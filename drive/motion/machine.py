@@ -110,7 +110,7 @@ class State:
     """Everything that decides about motion.
 
     Attributes:
-        enabled: whether anyone may drive.
+        enabled: whether driving is enabled at all.
         command: newest of the present lease.
         command_ns: when it arrived.
         since_ns: when the phase began.

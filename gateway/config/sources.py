@@ -75,7 +75,7 @@ class SourceSettings(Section):
     kind: Annotated[str, AfterValidator(_known_kind), Field(json_schema_extra={"enum": [*KINDS]})]
     """What its values are."""
     label: str | None = None
-    """Tells sources of one kind apart: the input of the command mux, or the name of a generic value."""
+    """Distinguishes sources of one kind: the input of the command mux, or the name of a generic value."""
     title: Title = ""
     """Name of a generic value for operators; by default its label with blanks."""
     topic: Annotated[

@@ -121,7 +121,7 @@ class DriveActual:
         problems: of the base, for people.
         base_timeout_ms: silence after which the base stops by itself; None if it is not known.
         reset_obstacle: what keeps the stop from being reset, for people; empty when nothing does.
-        enabled: whether anyone may drive, whatever the phase; None of an older drive program.
+        enabled: whether driving is enabled, whatever the phase; None of an older drive program.
     """
 
     instance_id: str

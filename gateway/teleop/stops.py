@@ -117,7 +117,7 @@ def _report_since(view: DriveView, since_ns: int) -> DriveActual | None:
 
 
 class Stops:
-    """Stops the robot, for anyone, and resets that.
+    """Stops the robot, for callers of every role, and resets that.
 
     A stop that the drive program does not confirm is kept, the newest one alone, and is the first message of
     the next connection, however late that comes, because no reset has undone it. Its caller knows that.

@@ -48,7 +48,7 @@ class TestSource(AnySource):
 
     kind: Literal["test"] = "test"
     pattern: Literal["smpte", "ball", "snow", "checkers-8", "red", "green", "blue"] = "smpte"
-    """Pattern of GStreamer's videotestsrc: different ones tell cameras apart."""
+    """Pattern of GStreamer's videotestsrc: different ones distinguish cameras."""
 
 
 CameraFormat = Literal["auto", "raw", "jpeg"]

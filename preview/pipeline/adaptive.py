@@ -115,7 +115,7 @@ class _Observed:
 
     rtt: QueueDelay = field(default_factory=lambda: QueueDelay(_RTT_SLACK_MS, _RTT_SLACK_SHARE))
     loss_percent: float = 0.0
-    """Of the newest window, but no more than on average: neither one bad window counts nor what is over."""
+    """Of the newest window, and at most the average: one bad window does not count, nor do earlier losses."""
     newest_loss_percent: float = 0.0
     dropped_percent: float = 0.0
     _average_loss_percent: float = 0.0

@@ -85,7 +85,7 @@ class Framing:
         # One step for whatever writes at this moment: the number stays, the file is another one (dup2(2)).
         os.dup2(fd, self._write_fd, inheritable=False)
 
-    def send_to_nobody(self) -> None:
+    def discard(self) -> None:
         """Discards the frames from now on."""
         null = os.open(os.devnull, os.O_WRONLY | os.O_CLOEXEC)
         self.send_to(null)

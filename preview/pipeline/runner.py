@@ -256,7 +256,7 @@ class Runner:
         Raises:
             HungError: it hangs.
         """
-        self._framing.send_to_nobody()
+        self._framing.discard()
         self._keyframe_gate.unwatch()
         listener, self._listener = self._listener, None
         return await listener.stop() if listener else lambda: None

@@ -32,7 +32,7 @@ class Retries:
         return self._backoff.failures
 
     def failed(self) -> None:
-        """Takes note of a failure: it is not due before the next pause is over."""
+        """Takes note of a failure: it is not due before the next pause has ended."""
         self._due_s = self._clock() + self._backoff.next_s()
 
     def succeeded(self) -> None:

@@ -40,7 +40,7 @@ class Export:
         self.sha256 = content.sha256
         self.closed = asyncio.Event()
         self._sum = sum_
-        self._sum.add_done_callback(_forget)
+        self._sum.add_done_callback(_retrieve_error)
 
     async def verified(self) -> None:
         """Returns once the whole file, also what is not exported of it, has the sum that it was written with.
@@ -62,8 +62,8 @@ class Export:
         self.file.close()
 
 
-def _forget(sum_: "asyncio.Task[bytes]") -> None:
-    """Takes note of the error that the sum of an export may have ended with that is over."""
+def _retrieve_error(sum_: "asyncio.Task[bytes]") -> None:
+    """Retrieves the error of a sum that outlasts its export: asyncio logs one that is never retrieved."""
     if not sum_.cancelled():
         sum_.exception()
 

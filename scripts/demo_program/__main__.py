@@ -15,7 +15,7 @@ os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 from demo_program.check import check
 from demo_program.ground import DEFAULT_GRPC_PORT, DEFAULT_SRT_PORT, Ground, Options, prepared
 from demo_program.interruption import Interruption
-from demo_program.programs import Programs, ProgramTroubleError
+from demo_program.programs import ProgramError, Programs
 from demo_program.show import show
 from demo_program.sources import parse_source
 
@@ -47,8 +47,8 @@ def main() -> int:
 
 
 def _log_tails(ground: Ground, error: UserError) -> str:
-    """The log of the program that made the trouble, or all, where none can be blamed yet."""
-    return ground.log_tails(error.program if isinstance(error, ProgramTroubleError) else "")
+    """The end of the log of the program that failed; of all logs where it is not known which did."""
+    return ground.log_tails(error.program if isinstance(error, ProgramError) else "")
 
 
 def _failed(is_check: bool, tails: str) -> int:
@@ -96,7 +96,7 @@ def _port(text: str) -> int:
 
 
 def _domain(text: str) -> int:
-    # Beyond 101 a domain's ports reach into the range that Linux hands out to anybody.
+    # Beyond 101 a domain's ports reach into the range of ephemeral ports of Linux.
     return _number(text, 0, 101)
 
 

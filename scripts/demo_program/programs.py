@@ -24,7 +24,7 @@ _POLL_S: Final = 0.05
 AnswerT = TypeVar("AnswerT")
 
 
-class ProgramTroubleError(UserError):
+class ProgramError(UserError):
     """One of the programs ended by itself, or would not end.
 
     Args:
@@ -79,7 +79,7 @@ class Programs:
         """Ends all, the last one first. Calling it again does nothing.
 
         Raises:
-            ProgramTroubleError: one did not end in good order; it is gone all the same.
+            ProgramError: one did not end in good order; it is gone all the same.
         """
         with _undisturbed():
             self._stops.close()
@@ -89,12 +89,12 @@ class Programs:
         return {name: process.pid for name, process in self._running.items()}
 
     def check_alive(self) -> None:
-        """Raises ProgramTroubleError when one has ended by itself, KeyboardInterrupt when all shall end."""
+        """Raises ProgramError when one has ended by itself, KeyboardInterrupt when all shall end."""
         self.interruption.raise_if_asked()
         for name, process in self._running.items():
             code = process.poll()
             if code is not None:
-                raise ProgramTroubleError(name, _end_in_words(code))
+                raise ProgramError(name, _end_in_words(code))
 
     def wait_until(
         self, look: Callable[[], AnswerT | None], within_s: float, what: str | Callable[[], str]
@@ -120,7 +120,7 @@ class Programs:
 
     def _stop_after_trouble(self) -> None:
         # Why the demo ends counts more than how a program takes its end.
-        with suppress(ProgramTroubleError):
+        with suppress(ProgramError):
             self.stop()
 
     def _start(self, name: str, *arguments: str) -> None:
@@ -153,9 +153,9 @@ class Programs:
         process.wait()
         del self._running[name]
         if late:
-            raise ProgramTroubleError(name, f"did not end within {_STOP_WITHIN_S:g} s and was killed")
+            raise ProgramError(name, f"did not end within {_STOP_WITHIN_S:g} s and was killed")
         if process.returncode and not ended_before:
-            raise ProgramTroubleError(name, _end_in_words(process.returncode))
+            raise ProgramError(name, _end_in_words(process.returncode))
 
 
 def _end_in_words(code: int) -> str:

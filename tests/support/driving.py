@@ -262,12 +262,12 @@ class Driving:
         return state
 
     def ready(self) -> Peer:
-        """Connects a new gateway's end and resets what is latched; nobody drives when this returns."""
+        """Connects a new gateway's end and resets what is latched; no one drives when this returns."""
         if self.guard is None or self.guard.poll() is not None:
             self.start()
         wait_until(self.observer.state, "a worker that serves", 30)
         peer = self.connect()
-        wait_until(self._available, "nobody drives, and no stop is latched", 30)
+        wait_until(self._available, "no one drives, and no stop is latched", 30)
         return self.peer or peer
 
     def drive(self, vx: float = 0.1) -> Peer:

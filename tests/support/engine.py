@@ -22,11 +22,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Skips what needs Docker where there is none: here, so that all of it makes one line of the summary."""
-    if item.get_closest_marker("docker") is None or not (trouble := _trouble()):
+    if item.get_closest_marker("docker") is None or not (problem := _problem()):
         return
     if item.config.getoption("--require-docker"):
-        pytest.fail(f"--require-docker: {trouble}", pytrace=False)
-    pytest.skip(f"{trouble}. Type: docker/engine start")
+        pytest.fail(f"--require-docker: {problem}", pytrace=False)
+    pytest.skip(f"{problem}. Type: docker/engine start")
 
 
 @pytest.fixture(scope="session")
@@ -42,7 +42,7 @@ def images() -> str:
 
 
 @cache
-def _trouble() -> str:
+def _problem() -> str:
     """Why tests can't use Docker; empty when they can."""
     for command in (["docker", "info"], ["docker", "compose", "version"]):
         try:

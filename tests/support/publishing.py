@@ -22,7 +22,7 @@ class Publishing:
 
     @property
     def heard(self) -> bool:
-        """Whether anyone subscribes."""
+        """Whether the topic has a subscriber."""
         return bool(self.publisher.get_subscription_count())
 
     def publish(self, count: int) -> None:

@@ -57,7 +57,7 @@ def let_pass(seconds: float) -> None:
     loop = QEventLoop()
     QTimer.singleShot(round(seconds * 1000), loop.quit)
     loop.exec()
-    # After a stall the time is over before what has come meanwhile was looked at.
+    # After a stall the time has passed before what has come meanwhile was looked at.
     for _ in range(_TURNS):
         QCoreApplication.processEvents()
 

@@ -25,7 +25,7 @@ class HandedFile:
         file: open for reading.
         offset: from where on to read it.
         pace: at which.
-        connection: tells the recorder that it is still read.
+        connection: shows the recorder, by being open, that the file is still read.
 
     Attributes:
         file: the same.
@@ -40,7 +40,7 @@ class HandedFile:
         self._connection = connection
 
     def finish(self) -> None:
-        """Tells the recorder that everything has been read."""
+        """Closes the connection, by which the recorder sees that everything has been read."""
         self._connection.close()
 
 

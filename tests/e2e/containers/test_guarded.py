@@ -1,4 +1,4 @@
-"""A gateway that asks who calls, in containers: from a start without credentials to one that is over."""
+"""A gateway that asks who calls, in containers: from a start without credentials to one that has ended."""
 
 import json
 import re

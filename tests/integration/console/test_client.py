@@ -361,7 +361,7 @@ def another_program() -> Iterator[str]:
                 try:
                     connection, _ = listener.accept()
                 except OSError:
-                    return  # The listener was shut down: the test is over.
+                    return  # The listener was shut down: the test has ended.
                 with connection:
                     connection.sendall(b"HTTP/1.1 400 Bad Request\r\nConnection: close\r\n\r\n")
 

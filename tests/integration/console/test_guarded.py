@@ -1,4 +1,4 @@
-"""robotctl at a robot that asks who calls: logging in, roles, and a login that is over."""
+"""robotctl at a robot that asks who calls: logging in, roles, and a login that has ended."""
 
 import json
 import re

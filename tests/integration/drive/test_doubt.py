@@ -258,7 +258,7 @@ def test_a_reset_waits_until_a_source_that_moved_the_robot_can_be_heard(robot: D
 
 
 def test_a_terminal_that_reads_nothing_keeps_no_zero_back(tmp_path: Path, ros_domain: int) -> None:  # noqa: ARG001
-    """Standard error is a full pipe: whoever logs there would stand still before the zeros."""
+    """Standard error is a full pipe: a process that logs there itself would block before the zeros."""
     reader, writer = os.pipe()
     with driving(tmp_path) as robot:
         assert robot.guard

@@ -343,7 +343,7 @@ async def test_a_damaged_manifest_is_made_anew_and_kept_aside(tmp_path: Path) ->
 async def test_a_manifest_that_the_disk_refuses_to_read_is_neither_damaged_nor_written_over(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int
 ) -> None:
-    """The defect: label, notes and what was to be copied were lost by an error that is over in a moment."""
+    """The defect: label, notes and what was to be copied were lost by an error that ends after a moment."""
     old, cut = await cut_off(tmp_path)
     folder = tmp_path / "recordings" / cut.id
     written = manifest_of(tmp_path, cut)
@@ -763,8 +763,8 @@ async def test_the_room_that_is_reported_includes_what_older_recordings_make(sma
             return running.status_reader.room_s or 0.0
 
         await running.until(shown)
-        told_bytes = (running.status_reader.room_s or 0.0) * running.status_reader.bytes_per_s
-        assert one.size + 4 * MIB < told_bytes < one.size + 6 * MIB
+        shown_bytes = (running.status_reader.room_s or 0.0) * running.status_reader.bytes_per_s
+        assert one.size + 4 * MIB < shown_bytes < one.size + 6 * MIB
         await running.operations.stop("2", "")
         assert not running.status_reader.disk_short
         ballast.unlink()

@@ -95,7 +95,7 @@ async def test_it_lasts_for_the_second_fault_as_long_as_for_the_first(ground: Gr
     made = await ground.fault("vision.silent")
     ground.clock.ahead_s = POST_S - 20
     await ground.fault("battery.low")
-    # The first one's end is over, and the second one's is not.
+    # The first one's end has passed, and the second one's has not.
     ground.clock.ahead_s = POST_S + 20
     ground.sent.send(10)
     # An operation takes what there is to do; a snapshot of its own ends at once, and the incident goes on.

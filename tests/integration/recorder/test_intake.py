@@ -388,12 +388,12 @@ def test_how_many_are_lost_is_unknown_while_the_publishers_are(talker: Talker, t
         wait_until(lambda: taken.samples("/theirs"), "a message of the peer")
         stall(taken, publisher, Odometry())
 
-        def told() -> list[Loss]:
+        def reported() -> list[Loss]:
             losses = [each for each in list(taken.items) if isinstance(each, Loss)]
             return [each for each in losses if each.channel and each.channel.topic == "/theirs"]
 
-        wait_until(told, "a loss")
-        assert {each.messages for each in told()} == {None}
+        wait_until(reported, "a loss")
+        assert {each.messages for each in reported()} == {None}
 
 
 def test_what_is_lost_is_reported_while_the_topics_cannot_be_listed(

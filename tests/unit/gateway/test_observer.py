@@ -23,9 +23,9 @@ def snapshot(board: Board, preview: PreviewView = OFF, now_s: float = 100.0) -> 
     return status.snapshot_of(board, SOURCES, now_s=now_s, preview=preview)
 
 
-def sentences(news: list[Event]) -> list[str]:
+def sentences(events: list[Event]) -> list[str]:
     """What the overlay's short list shows."""
-    return [each.sentence for each in news if each.sentence is not None]
+    return [each.sentence for each in events if each.sentence is not None]
 
 
 def test_the_first_look_is_the_ground_and_no_news() -> None:
@@ -68,8 +68,8 @@ def test_each_settled_state_of_the_preview_is_an_event_of_its_own() -> None:
 
     def changes(state: PreviewState, profile: Profile, last_error: str = "") -> list[PreviewChanged]:
         view = replace(OFF, state=state, profile=profile, last_error=last_error)
-        news = observer.observe(snapshot(Board(), view))
-        return [each.detail for each in news if isinstance(each.detail, PreviewChanged)]
+        events = observer.observe(snapshot(Board(), view))
+        return [each.detail for each in events if isinstance(each.detail, PreviewChanged)]
 
     running, low = PreviewState.RUNNING, Profile.LOW_BW
     assert changes(PreviewState.STARTING, low) == []
@@ -81,7 +81,7 @@ def test_each_settled_state_of_the_preview_is_an_event_of_its_own() -> None:
     assert changes(PreviewState.STOPPING, Profile.BALANCED) == []
     off = PreviewChanged(PreviewState.DISABLED, Profile.BALANCED, "")
     assert changes(PreviewState.DISABLED, Profile.BALANCED) == [off]
-    assert changes(PreviewState.DISABLED, low) == [], "the profile of the next preview is no news"
+    assert changes(PreviewState.DISABLED, low) == [], "the profile of the next preview is no event"
 
 
 def test_another_live_camera_is_news_and_a_failed_one_a_fault() -> None:
@@ -114,9 +114,9 @@ def test_another_live_camera_is_news_and_a_failed_one_a_fault() -> None:
 def test_what_a_fault_says_to_programs() -> None:
     observer, board = new_observer(startup_grace_s=0.0), Board()
     raised = ((each, each.detail) for each in observer.observe(snapshot(board)))
-    [(news, detail)] = [(each, detail) for each, detail in raised if isinstance(detail, FaultRaised)]
-    assert (news.severity, news.component) == (Severity.ERROR, "odometry")
-    assert news.message == detail.fault.condition.message, "without the word that the severity says"
+    [(event, detail)] = [(each, detail) for each, detail in raised if isinstance(detail, FaultRaised)]
+    assert (event.severity, event.component) == (Severity.ERROR, "odometry")
+    assert event.message == detail.fault.condition.message, "without the word that the severity says"
 
 
 def test_a_fallback_to_another_encoder_is_news() -> None:
@@ -124,14 +124,14 @@ def test_a_fallback_to_another_encoder_is_news() -> None:
     running = replace(OFF, state=PreviewState.RUNNING, encoder=Encoder("mpp-h265", True, "mpp-h265", ""))
     observer.observe(snapshot(Board(), running))
     fallen = replace(running, encoder=Encoder("x264", False, "mpp-h265", "no output for 2 s"))
-    news = observer.observe(snapshot(Board(), fallen))
-    assert sentences(news) == [
+    events = observer.observe(snapshot(Board(), fallen))
+    assert sentences(events) == [
         "warning: x264 encodes on the robot's own processor instead of mpp-h265: no output for 2 s"
     ]
-    details = [each.detail for each in news]
+    details = [each.detail for each in events]
     assert EncoderFallback("x264", "mpp-h265", "no output for 2 s") in details
     assert sum(isinstance(each, FaultRaised) for each in details) == 1
-    assert [each.severity for each in news].count(Severity.WARNING) == 1, "the warning once"
+    assert [each.severity for each in events].count(Severity.WARNING) == 1, "the warning once"
     assert observer.observe(snapshot(Board(), fallen)) == [], "once"
 
 
@@ -161,10 +161,10 @@ def test_an_unreachable_service_is_an_event_and_worse_while_it_is_desired() -> N
     gone = replace(OFF, service_reachable=False)
     message = "the preview service does not answer: video is not available"
 
-    def news(preview: PreviewView) -> list[str]:
+    def reported(preview: PreviewView) -> list[str]:
         said = sentences(observer.observe(snapshot(Board(), preview)))
         return [each for each in said if "preview service" in each]
 
-    assert news(gone) == [f"warning: {message}"]
-    assert news(replace(gone, state=PreviewState.FAULTED)) == [f"error now: {message}"]
-    assert news(OFF) == [f"cleared: {message}"]
+    assert reported(gone) == [f"warning: {message}"]
+    assert reported(replace(gone, state=PreviewState.FAULTED)) == [f"error now: {message}"]
+    assert reported(OFF) == [f"cleared: {message}"]

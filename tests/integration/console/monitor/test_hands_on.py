@@ -298,4 +298,4 @@ def test_a_hundred_faults_do_not_burst_the_window(desk_work: Desk) -> None:
     assert desk_work.window.video.height() >= 180
     keep_screenshot(desk_work.window, "hundred-faults")
     del desk_work.gateway.status.faults[:]
-    until(lambda: len(desk_work.window.side.faults.shown) == 1, "they are over")
+    until(lambda: len(desk_work.window.side.faults.shown) == 1, "they have ended")

@@ -40,8 +40,8 @@ def becomes(session: VideoSession, state: PlaybackState) -> float:
 
 
 def keeps_its_limits(of_its_limit: Callable[[], float]) -> None:
-    """Judges how soon a freeze shows and is over; `of_its_limit` returns the larger share of its limit."""
-    what = "time until a freeze shows, or is over, of its limit"
+    """Judges how soon a freeze shows and ends; `of_its_limit` returns the larger share of its limit."""
+    what = "time until a freeze shows, or ends, of its limit"
     keeps(1.0, what, of_its_limit, per_stalled_s=1 / FREEZE_SHOWN_WITHIN_S)
 
 

@@ -115,7 +115,7 @@ def test_a_freeze_is_painted_at_once_and_gone_when_the_video_is_back(
     ground.switch_on()
     keeps(
         1.0,
-        "time until a freeze is painted, or is over, of its limit",
+        "time until a freeze is painted, or ends, of its limit",
         of_its_limit,
         per_stalled_s=1 / FREEZE_SHOWN_WITHIN_S,
     )

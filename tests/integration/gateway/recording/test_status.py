@@ -57,7 +57,7 @@ async def test_a_recording_begins_loses_and_ends_in_events(tmp_path: Path) -> No
 @pytest.mark.timed
 async def test_a_recording_that_only_grows_wakes_no_watcher(tmp_path: Path) -> None:
     async with recording_robot(tmp_path, platform=ONE_SAMPLE) as robot:
-        # The computer's load is news, too: every sample of it wakes watchers.
+        # The computer's load is a change, too: every sample of it wakes watchers.
         await eventually(
             robot.operator.status, lambda now: now.platform.network.available, "the platform's only sample"
         )

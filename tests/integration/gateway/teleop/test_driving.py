@@ -399,7 +399,7 @@ async def test_a_session_given_up_while_it_opens_leaves_no_driver(
     opening.cancel()
     with pytest.raises(asyncio.CancelledError):
         await opening
-    await eventually(holder, lambda it: not it, "nobody has the lease")
+    await eventually(holder, lambda it: not it, "no one has the lease")
 
 
 @anew_after_a_loss

@@ -176,7 +176,7 @@ async def test_the_age_of_the_picture_limits_the_speed(scene: Scene) -> None:
             await in_motion(client, session, scene.robot.base, FAST_MPS)
             assert await fastest_mps(scene, session) > SLOWED_MPS
             later_ns = LATER_NS
-            # What was commanded by younger pictures is over.
+            # What was commanded by younger pictures has ended.
             await held(session, LONGER_S, FAST_MPS)
             slowed_mps = 0.0
             while (

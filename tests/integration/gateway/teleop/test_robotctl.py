@@ -147,7 +147,7 @@ def tapped_after_s(screen: Terminal, robot: DrivenRobot) -> float:
     screen.press("w")
     time.sleep(TAP_S + QUIET_S)
     if not any(each.moves for each in robot.base.heard[before:]):
-        raise DisturbedError("the press was over before the robot could follow it")
+        raise DisturbedError("the press had ended before the robot could follow it")
     return robot.base.stopped_after_s(pressed_s)
 
 

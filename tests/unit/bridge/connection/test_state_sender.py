@@ -18,7 +18,7 @@ from omniseer.gateway.v1.system_status_pb2 import SystemStatus
 
 
 class EndError(Exception):
-    """The time of the test is over."""
+    """The time of the test has passed."""
 
 
 class World:
@@ -29,7 +29,7 @@ class World:
 
     Attributes:
         now_s: since the start; moved by sleeping.
-        end_s: when the test is over.
+        end_s: when the test ends.
         refusals: how many states the hub refuses first.
         away_s: how long the first connection takes.
         takes_s: how long the hub takes for a state.

@@ -340,7 +340,7 @@ def test_a_lease_before_its_first_command_keeps_no_source_away() -> None:
 
 
 def test_an_older_tools_command_keeps_no_source_away() -> None:
-    """Its lease ends by itself, without anyone who could release it."""
+    """Its lease ends by itself, without a driver who could release it."""
     robot = Robot(streaming=False)
     robot.feed(GrantLease(robot.lease))
     robot.feed(Stop("ben"))

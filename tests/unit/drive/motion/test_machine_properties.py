@@ -107,7 +107,7 @@ class Driving(RuleBasedStateMachine):
         self.slowing_down_only_follows_a_release()
         self.motion_begins_with_a_press_after_a_release()
         self.limits_hold()
-        self.nothing_is_published_when_nobody_drives()
+        self.nothing_is_published_when_no_one_drives()
         self.a_stop_stays_until_its_reset()
         self.the_sequence_only_grows()
         self.reasons_are_known_with_and_without_a_driver()
@@ -356,7 +356,7 @@ class Driving(RuleBasedStateMachine):
             grown = abs(getattr(output, name)) - abs(getattr(previous, name))
             assert grown <= limit * elapsed_s + 1e-9
 
-    def nothing_is_published_when_nobody_drives(self) -> None:
+    def nothing_is_published_when_no_one_drives(self) -> None:
         silent = self.state.phase in {Phase.DISABLED, Phase.AVAILABLE}
         assert (self.state.output is None) == silent
         if silent:

@@ -66,7 +66,7 @@ def test_this_is_no_change(later: Snapshot) -> None:
         ),
         pytest.param(snapshot(now_s=101.5), id="it grows stale"),
         pytest.param(snapshot(faults=()), id="a fault is gone"),
-        pytest.param(snapshot(faults=(replace(FAULT, cleared_s=100.0),)), id="a fault is over"),
+        pytest.param(snapshot(faults=(replace(FAULT, cleared_s=100.0),)), id="a fault has cleared"),
         pytest.param(snapshot(preview=replace(OFF, state=PreviewState.RUNNING)), id="the preview runs"),
         pytest.param(
             snapshot(preview=replace(OFF, measured=Received(Measurement(29, 2500, 1, 10, None, None), 99.9))),

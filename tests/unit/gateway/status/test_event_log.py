@@ -18,7 +18,7 @@ from gateway.status.event_log import (
 from gateway.status.fault import Severity
 
 
-def news(words: str, sentence: str | None = None) -> Event:
+def event_of(words: str, sentence: str | None = None) -> Event:
     return Event(Severity.INFO, "mission", words, ModeChanged(words), sentence)
 
 
@@ -30,7 +30,7 @@ def action(result: ControlResult = ControlResult.ACCEPTED) -> Event:
 def filled(count: int, kept: int = 4, run_id: str = "run") -> EventLog:
     log = EventLog(run_id, kept, unix_ms=lambda: 0)
     for number in range(1, count + 1):
-        log.add(news(f"event {number}"), float(number))
+        log.add(event_of(f"event {number}"), float(number))
     return log
 
 
@@ -78,8 +78,8 @@ def test_a_place_that_was_not_reached_is_refused() -> None:
 def test_the_overlay_has_the_newest_few_with_a_count_of_its_own() -> None:
     log = EventLog("run")
     for number in range(1, ON_OVERLAY + 4):
-        log.add(news("left out"), 0.0)
-        log.add(news("read", f"sentence {number}"), float(number))
+        log.add(event_of("left out"), 0.0)
+        log.add(event_of("read", f"sentence {number}"), float(number))
     assert [event.sequence for event in log.newest()] == list(range(4, ON_OVERLAY + 4))
     assert log.newest()[-1].message == f"sentence {ON_OVERLAY + 3}"
     assert log.sequence == 2 * (ON_OVERLAY + 3)
@@ -91,7 +91,14 @@ def test_the_overlay_has_the_newest_few_with_a_count_of_its_own() -> None:
 )
 def test_actions_outlast_the_ring_and_refusals_do_not(result: ControlResult, kept: list[int]) -> None:
     log = EventLog("run", 4, unix_ms=lambda: 0)
-    for each in (news("x"), action(result), action(result), news("x"), action(result), *[news("x")] * 10):
+    for each in (
+        event_of("x"),
+        action(result),
+        action(result),
+        event_of("x"),
+        action(result),
+        *[event_of("x")] * 10,
+    ):
         log.add(each, 0.0)
     subscriber = Subscriber()
     while subscriber.position != Position("run", 15):
@@ -115,7 +122,7 @@ def test_actions_outlast_the_ring_and_refusals_do_not(result: ControlResult, kep
 )
 def test_a_reading_ends_where_a_gap_begins(after: Position | None, gap: Gap | None, read: list[int]) -> None:
     log = EventLog("run", 2, unix_ms=lambda: 0)
-    for each in (news("x"), action(), action(), *[news("x")] * 5):
+    for each in (event_of("x"), action(), action(), *[event_of("x")] * 5):
         log.add(each, 0.0)
     reading = log.read(after, 100)
     assert (reading.gap, [each.sequence for each in reading.events]) == (gap, read)
@@ -128,7 +135,7 @@ def test_the_older_actions_are_bounded() -> None:
     for _ in range(CAPACITY + MAX_OLDER_ACTIONS + 50):
         log.add(action(), 0.0)
     for _ in range(2 * CAPACITY):
-        log.add(news("x"), 0.0)
+        log.add(event_of("x"), 0.0)
     assert len(log.read(None, 10_000).events) == MAX_OLDER_ACTIONS
 
 
@@ -179,7 +186,7 @@ def test_each_event_comes_once_and_in_order_or_a_gap_accounts_for_it(
         match what:
             case "happen":
                 for _ in range(count):
-                    log.add(news("x"), 0.0)
+                    log.add(event_of("x"), 0.0)
             case "act":
                 for _ in range(count):
                     log.add(action(), 0.0)

@@ -106,8 +106,8 @@ class Life(RuleBasedStateMachine):
 
     def look(self) -> Snapshot:
         now = self.snapshot()
-        for news in self.observer.observe(now):
-            said = news.sentence or ""
+        for event in self.observer.observe(now):
+            said = event.sentence or ""
             self.raised += said.startswith(("error: ", "warning: "))
             self.cleared += said.startswith("cleared: ")
         return now

@@ -30,17 +30,17 @@ def test_a_longer_interval_is_the_heartbeat_as_well() -> None:
     st.lists(st.tuples(st.integers(1, 30), st.booleans()), min_size=1, max_size=200),
 )
 def test_never_too_often_and_every_change_is_sent(asked_ms: int, steps: list[tuple[int, bool]]) -> None:
-    now, version, told_at, told_version = 0, 0, 0, 0
+    now, version, sent_at, sent_version = 0, 0, 0, 0
     pace = WatchPacing(asked_ms, now, version)
     for ticks, changed in steps:
         version += changed
         for _ in range(ticks):
             now += 1
             if pace.due(now, version):
-                assert (now - told_at) * TICK_MS >= min(asked_ms, HEARTBEAT_MS) or version != told_version
-                assert (now - told_at) * TICK_MS >= asked_ms
+                assert (now - sent_at) * TICK_MS >= min(asked_ms, HEARTBEAT_MS) or version != sent_version
+                assert (now - sent_at) * TICK_MS >= asked_ms
                 pace.sent(now, version)
-                told_at, told_version = now, version
+                sent_at, sent_version = now, version
             else:
-                late = now - told_at >= max(BEAT, -(-asked_ms // TICK_MS))
+                late = now - sent_at >= max(BEAT, -(-asked_ms // TICK_MS))
                 assert not late, "ages are shown in time"

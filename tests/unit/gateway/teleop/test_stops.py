@@ -173,7 +173,7 @@ async def test_a_report_of_an_earlier_stop_confirms_no_later_one(drive: Drive) -
 
 
 async def test_stops_of_two_callers_in_turns_are_few_for_the_drive_program(drive: Drive) -> None:
-    """Each caller's are confirmed once in a while, whoever stops in between."""
+    """Each caller's are confirmed once in a while, also when the other one stops in between."""
     stops = stops_of(drive)
     for number in range(200):
         for by in ("anna", "ben"):

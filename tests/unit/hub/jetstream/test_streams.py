@@ -74,7 +74,7 @@ async def test_but_not_for_ever() -> None:
 @pytest.mark.parametrize("takes_s", [0.25, 4.0])
 @in_virtual_time
 async def test_nodes_that_have_joined_at_the_last_moment_make_all_streams(takes_s: float) -> None:
-    """The defect: when the time to join was over, a stream in the making was given up, others not made."""
+    """The defect: when the time to join had passed, a stream in the making was given up, others not made."""
     hub = _Joining([], streams.JOINING_S - 0.5, takes_s)
     assert await made_by(hub) == []
     assert len([call for call in hub.calls if "CREATE" in call]) > len(streams.stream_configs(3))

@@ -25,7 +25,7 @@ def prober(results: dict[str, Verdict]) -> TrialProber:
 
 
 def selection(verdicts: dict[str, Verdict], clock: Clock | None = None) -> Selection:
-    """A selection whose trials are over."""
+    """A selection whose trials have ended."""
     tried = prober(verdicts)
     tried.verdicts.update(verdicts)
     return Selection(ORDER, 600, tried, clock or Clock())

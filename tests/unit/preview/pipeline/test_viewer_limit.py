@@ -103,7 +103,7 @@ def test_many_hosts_without_it_keep_out_no_viewer_of_a_host_that_has_watched(lis
     assert [listener.joins("10.0.0.1", port) for port in range(LIMIT + 1)] == [True] * LIMIT + [False]
     listener.leaves("10.0.0.1", 0)
     listener.clock.now_s += HANDSHAKE_S
-    assert listener.joins("10.0.0.2"), "until theirs are over"
+    assert listener.joins("10.0.0.2"), "until theirs have ended"
 
 
 def test_a_viewer_that_repeats_its_request_is_one(listener: Listener) -> None:

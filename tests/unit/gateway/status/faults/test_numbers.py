@@ -97,15 +97,15 @@ def test_crossing_each_limit_is_an_event() -> None:
 
 def test_a_value_on_the_edge_is_one_event() -> None:
     robot = Robot()
-    news = [event for step in range(50) for event in robot.reads(80.0 if step % 2 else 79.0)]
-    assert len(news) == 1
+    events = [event for step in range(50) for event in robot.reads(80.0 if step % 2 else 79.0)]
+    assert len(events) == 1
 
 
 def test_a_value_that_swings_across_both_limits_is_two_events() -> None:
     """Warning, error, and nothing more: less severe and good have to last."""
     robot = Robot()
-    news = [event for step in range(50) for event in robot.reads((85.0, 99.0)[step % 2])]
-    assert sentences(news) == [
+    events = [event for step in range(50) for event in robot.reads((85.0, 99.0)[step % 2])]
+    assert sentences(events) == [
         "warning: Motor temperature is high: 80 °C or more",
         "error now: Motor temperature is too high: 95 °C or more",
     ]
