@@ -98,7 +98,7 @@ class Exports:
                 )
         except UserError as error:
             self._show(recording_id, state=ExportState.FAILED, text=str(error))
-            self._notes.add(f"Not copied: {error}", SeverityStyle.BAD)
+            self._notes.add(f"Export failed: {error}", SeverityStyle.BAD)
         except asyncio.CancelledError:
             self._show(recording_id, state=ExportState.CANCELLED, text="")
             raise

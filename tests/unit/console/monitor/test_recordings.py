@@ -281,7 +281,7 @@ async def test_a_copy_that_fails_says_why() -> None:
         now.robot.export = export
         now.recordings.export("one", FOLDER)
         text, style = await now.note()
-        assert text.startswith("Not copied: data/0 arrived twice")
+        assert text.startswith("Export failed: data/0 arrived twice")
         assert style is SeverityStyle.BAD
         assert now.recordings.view().exports["one"].state is ExportState.FAILED
 
