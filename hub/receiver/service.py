@@ -29,7 +29,15 @@ from google.protobuf.message import DecodeError, Message
 from fleet.names import LARGEST_MESSAGE, MOST_FILES
 from fleet.receipt_keys import digest_of
 from hub.receiver.keys import BadNameError, checked
-from hub.receiver.store import PART_BYTES, URL_VALID_S, Store, StoredObject, StoreError, StoreProblem
+from hub.receiver.store import (
+    MOST_PARTS,
+    PART_BYTES,
+    URL_VALID_S,
+    Store,
+    StoredObject,
+    StoreError,
+    StoreProblem,
+)
 from hub.receiver.verified import Party, Records, Refusal, StoreCalls, Verified, not_verified
 from omniseer.fleet.v1 import upload_pb2 as pb
 from omniseer.gateway.v1.recording_pb2 import Recording, RecordingFile
@@ -38,7 +46,6 @@ _log = logging.getLogger(__name__)
 
 PROGRESS_S: Final = 2.0
 _MOST_URLS: Final = 16
-_MOST_PARTS: Final = 10_000
 _LONGEST_ID: Final = 2048
 _LONGEST_ETAG: Final = 128
 _SHORTEST_S: Final = 600.0
@@ -196,7 +203,7 @@ class ReceiverService:
         parts = [(part.number, part.etag) for part in request.parts]
         if (
             [number for number, _ in parts] != list(range(1, len(parts) + 1))
-            or not 0 < len(parts) <= _MOST_PARTS
+            or not 0 < len(parts) <= MOST_PARTS
             or not all(0 < len(etag) <= _LONGEST_ETAG for _, etag in parts)
         ):
             raise Refusal(pb.UPLOAD_ERROR_CODE_INVALID, "the parts are not those of one file, in order")
@@ -339,7 +346,7 @@ def _method(
 
 def _checked_file(file: RecordingFile) -> RecordingFile:
     checked(file.name)
-    if len(file.sha256) != 32 or _part_count(file.size) > _MOST_PARTS:
+    if len(file.sha256) != 32 or _part_count(file.size) > MOST_PARTS:
         raise Refusal(pb.UPLOAD_ERROR_CODE_INVALID, "the file is too large, or has no SHA-256")
     return file
 

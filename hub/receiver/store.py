@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 PART_BYTES: Final = 8 * 1024 * 1024
 URL_VALID_S: Final = 900
 _READ_BYTES: Final = 1024 * 1024
-_CONNECTIONS: Final = 16
-_MOST_PARTS: Final = 10_000
+CONNECTIONS: Final = 16
+MOST_PARTS: Final = 10_000
+"""Of one file: what S3 permits of a multipart upload."""
 _SECRET_BYTES: Final = 1024
 _NO_ROOM: Final = frozenset(
     {"QuotaExceeded", "XMinioStorageFull", "InsufficientStorage", "StorageFull", "EntityTooLarge", "507"}
@@ -202,7 +203,7 @@ class Store:
             found = (part for page in pages for part in page.get("Parts", []))
             parts = [
                 StoredPart(part["PartNumber"], part["ETag"], part["Size"])
-                for part in islice(found, _MOST_PARTS)
+                for part in islice(found, MOST_PARTS)
             ]
         return sorted(parts, key=lambda part: part.number)
 
@@ -325,7 +326,7 @@ def _client(settings: StoreSettings, endpoint: str | None) -> "S3Client":
                 connect_timeout=5,
                 read_timeout=30,
                 retries={"mode": "standard", "total_max_attempts": 3},
-                max_pool_connections=_CONNECTIONS,
+                max_pool_connections=CONNECTIONS,
                 # Not every compatible store knows Amazon's checksums, which would be part of URLs.
                 request_checksum_calculation="when_required",
                 response_checksum_validation="when_required",

@@ -13,7 +13,7 @@ from fleet.errors import HubError, HubReason
 from fleet.names import LARGEST_MESSAGE, MOST_FILES, RECORDINGS
 from fleet.receipt_keys import ReceiptError, ReceiptSigner, confirmed
 from hub.receiver.keys import RecordingKeys
-from hub.receiver.store import Store
+from hub.receiver.store import CONNECTIONS, Store
 from omniseer.fleet.v1 import upload_pb2 as pb
 from omniseer.gateway.v1.recording_pb2 import Recording, RecordingFile
 
@@ -21,8 +21,8 @@ _P = ParamSpec("_P")
 _T = TypeVar("_T")
 _M = TypeVar("_M", bound=Message)
 
-THREADS: Final = 16
-"""Calls of the store at once."""
+THREADS: Final = CONNECTIONS
+"""Calls of the store at once: each has a connection."""
 _RECEIPT_BYTES: Final = 8192
 _RECORD_BYTES: Final = 4 * 1024 * 1024
 _MOST_IN_RECORD: Final = LARGEST_MESSAGE
