@@ -6,7 +6,6 @@ authentication.
 """
 
 import asyncio
-import gc
 import itertools
 import sys
 import time
@@ -18,6 +17,7 @@ from typing import Final
 import grpc
 import uvloop
 
+from common.garbage import freeze_objects
 from common.interceptors import RpcContext
 from gateway.app import running
 from gateway.assembly import Gateway, build
@@ -107,8 +107,7 @@ async def _serve(unlimited: bool, credentials: Path | None) -> None:
         gateway.events.note(_event(f"odometry received, for the {number}th time"))
     async with running(gateway, extra=[_reference(gateway)]) as port:
         # As the program does (gateway/app.py).
-        gc.collect()
-        gc.freeze()
+        freeze_objects()
         print(port, flush=True)
         await asyncio.to_thread(sys.stdin.read)
 

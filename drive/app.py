@@ -1,6 +1,5 @@
 """Assembles the guard and the worker, each of them a process."""
 
-import gc
 import logging
 import signal
 import sys
@@ -9,6 +8,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Final
 
+from common.garbage import freeze_objects
 from common.ros_node import OwnNode, ros_node
 from common.ros_transport import use_udp
 from drive.config import DriveSettings
@@ -51,9 +51,7 @@ def serve(settings: DriveSettings, config_file: Path | None) -> int:
         _take_signals(guard)
         raise_priority(_GUARD_PRIORITY)
         lock_memory()
-        # What lives now stays: a collection that looks at all of it may outlast the guard's patience.
-        gc.collect()
-        gc.freeze()
+        freeze_objects()
         code = guard.run()
     stop_file.close()
     return code

@@ -1,7 +1,6 @@
 """The gateway program: starts the parts in order, and stops them in reverse."""
 
 import asyncio
-import gc
 import logging
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
@@ -12,6 +11,7 @@ import grpc
 
 from common import heartbeat
 from common.advertisement import Advertisement
+from common.garbage import freeze_objects
 from common.metrics_endpoint import serving_metrics
 from gateway.assembly import Gateway, ThisRobot, build
 from gateway.config import GatewaySettings, SecuritySettings, without_effect
@@ -36,9 +36,7 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
     for sentence in without_effect(settings):
         _log.warning("%s", sentence)
     async with running(build(settings, ThisRobot(settings))):
-        # What lives now stays: a collection that looks at all of it holds every call up for 0.1 s.
-        gc.collect()
-        gc.freeze()
+        freeze_objects()
         heartbeat.own().ready()
         await stop.wait()
     _log.info("stopped")

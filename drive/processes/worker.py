@@ -11,6 +11,7 @@ import time
 from dataclasses import replace
 from typing import Final, Protocol
 
+from common.garbage import freeze_objects
 from common.suspend import SuspendWatch
 from drive.endpoint import wire
 from drive.endpoint.endpoint import Endpoint, Peer, Received
@@ -125,9 +126,8 @@ class Worker:
 
     def run(self) -> None:
         """Runs until `stopping` is set; the last velocity is zero, whatever ends it."""
-        # Nothing that lives now becomes garbage, and a collection would take milliseconds.
-        gc.collect()
-        gc.freeze()
+        freeze_objects()
+        # A collection takes milliseconds: while the robot may move none is made.
         gc.disable()
         try:
             while not self.stopping:
