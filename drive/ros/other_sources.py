@@ -55,11 +55,12 @@ class OtherSources:
         self._outputs, self._mux_output = outputs, mux_output
         self._ours = {*outputs, mux_output}
         self._inputs: dict[str, _Input] = {}
-        self._found: dict[str, str] = {}
+        self._known: dict[str, str] = {}
+        """Inputs of the newest node that was known to be the multiplexer, with their types."""
         self._missing: frozenset[str] = frozenset()
-        """Those of `_found` that the multiplexer did not take at the newest look."""
-        self._guessed = True
-        """Whether a node that is not known to publish for the base counted as the multiplexer."""
+        """Those of `_known` that it did not take at the newest look."""
+        self._found: dict[str, str] = {}
+        """What is to be listened to: `_known`, and what a guess has found."""
         self._looked_ns = self._taken_ns = 0
         self._commanding: tuple[str, ...] = ()
 
@@ -87,7 +88,7 @@ class OtherSources:
             self._follow(now_ns)
             # All are asked, so that each takes what has arrived.
             heard = [topic for topic, each in self._inputs.items() if each.commands(now_ns)]
-            early = self._guessed and now_ns - self._began_ns < DISCOVERY_NS
+            early = not self._known and now_ns - self._began_ns < DISCOVERY_NS
             self._commanding = () if early else tuple(topic for topic in heard if topic in self._found)
         return self._commanding
 
@@ -99,16 +100,16 @@ class OtherSources:
             # A node that has just gone, or a name that is no text.
             _log.debug("the inputs of the multiplexer can't be listed: %s", error)
             return
-        # A multiplexer that is started again has the inputs that it had; a guess adds to what was known.
-        if guessed and not self._guessed:
-            self._found |= found
-        elif found and self._guessed:
-            self._found, self._guessed = found, guessed
-        elif found:
-            # Its inputs are discovered one by one: what is missing now may be there at the next look.
-            missing = frozenset(self._found.keys() - found.keys())
-            self._found = {each: self._found[each] for each in missing - self._missing} | found
-            self._missing = missing
+        if guessed or not found:
+            # A multiplexer that is started again has the inputs that it had; meanwhile a guess adds to them.
+            self._missing = frozenset()
+            self._found = self._known | found if found else self._found
+            return
+        # Its inputs are discovered one by one: what is missing now may be there at the next look.
+        missing = frozenset(self._known.keys() - found.keys())
+        self._known = {each: self._known[each] for each in missing - self._missing} | found
+        self._missing = missing
+        self._found = self._known
 
     def _other_inputs(self, multiplexers: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
         """Yields topic and type of each velocity that these nodes take beside ours."""

@@ -88,7 +88,7 @@ def test_a_multiplexer_that_is_started_again_has_the_inputs_that_it_had(graph: G
     assert list(sources._inputs) == ["/cmd_vel_keyboard"]
 
 
-def test_one_that_is_discovered_input_by_input_keeps_those_that_are_missing_yet(graph: Graph) -> None:
+def test_one_that_is_discovered_input_by_input_keeps_those_that_are_not_there_yet(graph: Graph) -> None:
     """The defect: a source that went on publishing to one of them was not heard until the next look."""
     graph.nodes.add(MUX)
     both = graph.inputs[MUX] = (*INPUTS[MUX], "/cmd_vel_autonomy")
@@ -104,6 +104,37 @@ def test_one_that_is_discovered_input_by_input_keeps_those_that_are_missing_yet(
     graph.inputs[MUX] = INPUTS[MUX]
     named(sources, DISCOVERY_NS + 2_500 * MS, DISCOVERY_NS + 1_000 * MS)
     assert set(sources._inputs) == {"/cmd_vel_keyboard"}, "it does not take the other any more"
+
+
+@pytest.mark.parametrize("beside", [set(), {RECORDER}], ids=["alone", "beside a recorder"])
+def test_one_that_was_half_discovered_as_it_went_keeps_its_inputs(graph: Graph, beside: set[str]) -> None:
+    """Its shutdown and its return are two different times at which an input is missing."""
+    graph.nodes = {MUX, *beside}
+    both = graph.inputs[MUX] = (*INPUTS[MUX], "/cmd_vel_autonomy")
+    sources = OtherSources(graph, [OUTPUT], MUX_OUTPUT)
+    named(sources, DISCOVERY_NS)
+    graph.inputs[MUX] = INPUTS[MUX]
+    named(sources, DISCOVERY_NS + 500 * MS, DISCOVERY_NS)
+    graph.nodes = beside
+    named(sources, 2 * DISCOVERY_NS, DISCOVERY_NS + 500 * MS)
+    graph.nodes = {MUX, *beside}
+    named(sources, 2 * DISCOVERY_NS + 500 * MS, 2 * DISCOVERY_NS)
+    assert {*both[1:]} <= set(sources._inputs)
+
+
+def test_what_an_observer_takes_leaves_room_as_soon_as_the_multiplexer_is_back(graph: Graph) -> None:
+    """It has an input now that it did not have before."""
+    graph.inputs[RECORDER] = (OUTPUT, *(f"/observed_{number}" for number in range(30)))
+    graph.nodes.add(MUX)
+    sources = OtherSources(graph, [OUTPUT], MUX_OUTPUT)
+    named(sources, DISCOVERY_NS)
+    graph.nodes.remove(MUX)
+    named(sources, 2 * DISCOVERY_NS, DISCOVERY_NS)
+    assert len(sources._inputs) == 16
+    graph.nodes.add(MUX)
+    graph.inputs[MUX] = (*INPUTS[MUX], "/cmd_vel_autonomy")
+    named(sources, 2 * DISCOVERY_NS + 200 * MS, 2 * DISCOVERY_NS)
+    assert {"/cmd_vel_keyboard", "/cmd_vel_autonomy"} <= set(sources._inputs)
 
 
 def test_the_multiplexers_inputs_are_listened_to_before_the_others_are_left(graph: Graph) -> None:
