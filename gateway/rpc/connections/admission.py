@@ -226,33 +226,30 @@ class Admission:
             return self.is_pending(peer)
         return self._clock() - connection.excess_s < FORGIVEN_AFTER_S
 
-    def dismiss(self, peer: Peer, *, revoked: bool = False) -> None:
-        """Takes the connection's place away, after a credential was invalid.
-
-        Args:
-            peer: the other end.
-            revoked: whether that has just ended streams of it.
-        """
+    def dismiss(self, peer: Peer) -> None:
+        """Takes the connection's place away, after a credential was invalid."""
         connection = self._connections.get(peer.address)
         if connection is not None:
-            self._dismiss(connection, revoked=revoked)
+            self._free_place(connection)
 
-    def dismiss_callers(self, lost: Collection[tuple[str, ...]], needed: Collection[str]) -> None:
+    def dismiss_callers(
+        self, lost: Collection[tuple[str, ...]], others: Mapping[str, tuple[str, ...]]
+    ) -> None:
         """Takes the places of connections away whose newest caller has lost access, before it calls again.
 
         Args:
             lost: `credential_ids` that have become invalid.
-            needed: `Peer.address` of connections with open streams of other callers.
+            others: `credential_ids` of a valid caller with an open stream, by `Peer.address`. The place is
+                its from now on.
         """
         for address, each in self._connections.items():
-            if each.credential_ids in lost and address not in needed:
-                self._dismiss(each, revoked=True)
-
-    def _dismiss(self, connection: _Connection, *, revoked: bool) -> None:
-        if connection.admitted:
-            if revoked:
-                connection.revoked_s = self._clock()
-            self._free_place(connection)
+            if each.credential_ids not in lost:
+                continue
+            if address in others:
+                each.credential_ids = others[address]
+            elif each.admitted:
+                each.revoked_s = self._clock()
+                self._free_place(each)
 
     def surplus(self, present: Iterable[str]) -> list[str]:
         """Returns the connections to close: pending ones, after PENDING_S or where there are too many.

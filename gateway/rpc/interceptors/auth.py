@@ -174,15 +174,17 @@ class Auth(Interceptor[CallContext]):
             self._stream_key.renew_passphrase()
         ended = []
         for call in [each for each in self._streams if each.principal and not valid(each.principal)]:
-            # First the stream, then the place: others of the same connection may be valid.
             ended.append((call, self._streams.pop(call)))
             call.refusal = self._authenticator.access_lost()
-            self._dismiss(call, revoked=True)
         if lost:
             # Calls of the health service, which need no credential, would keep them.
-            self._admission.dismiss_callers(lost, {each.peer.address for each in self._streams})
+            self._admission.dismiss_callers(lost, self._callers_of_streams())
         if ended:
             self._abort_later(self._abort_all(ended), name="revocation of streams")
+
+    def _callers_of_streams(self) -> dict[str, tuple[str, ...]]:
+        """Returns the credentials of a caller with an open stream, by `Peer.address` of its connection."""
+        return {each.peer.address: each.principal.credential_ids for each in self._streams if each.principal}
 
     def _abort_later(self, aborting: Coroutine[Any, Any, None], name: str) -> None:
         abort = asyncio.create_task(aborting, name=name)
@@ -196,14 +198,14 @@ class Auth(Interceptor[CallContext]):
             if number % _ABORTS_PER_TURN == 0:
                 await asyncio.sleep(0)
 
-    def _dismiss(self, call: CallContext, *, revoked: bool = False) -> None:
+    def _dismiss(self, call: CallContext) -> None:
         """Takes the connection's place away, unless a stream of a valid caller is open on it."""
         # A stranger's has none, and is not searched for: there may be thousands of such calls a second.
         if self._admission.is_pending(call.peer):
             return
         address = call.peer.address
         if not any(each.peer.address == address for each in self._streams):
-            self._admission.dismiss(call.peer, revoked=revoked)
+            self._admission.dismiss(call.peer)
 
     async def _abort(self, call: CallContext, task: "asyncio.Task[object]") -> None:
         """Aborts the call with the reason, and cancels it on our side whether or not the caller reads."""

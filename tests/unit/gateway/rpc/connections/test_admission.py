@@ -45,9 +45,9 @@ def from_many(count: int) -> list[str]:
     return [f"10.1.0.{number}:1000" for number in range(count)]
 
 
-def admit(admission: Admission, address: str) -> None:
+def admit(admission: Admission, address: str, *credential_ids: str) -> None:
     admission.take_token(peer_of(f"ipv4:{address}"))
-    admission.admit(peer_of(f"ipv4:{address}"))
+    admission.admit(peer_of(f"ipv4:{address}"), credential_ids=credential_ids)
 
 
 def test_a_pending_connection_has_a_while(admission: Admission, clock: Clock) -> None:
@@ -78,11 +78,10 @@ def test_who_has_lost_access_is_not_cut_off_before_it_knows(admission: Admission
     """However many strangers want the room: it has streams whose end is on its way."""
     revoked = from_one(PER_ADDRESS)
     for address in revoked:
-        admit(admission, address)
+        admit(admission, address, "anna")
     crowd = from_many(2 * PLACES)
     admission.surplus([*revoked, *crowd])
-    for address in revoked:
-        admission.dismiss(peer_of(f"ipv4:{address}"), revoked=True)
+    admission.dismiss_callers([("anna",)], {})
     assert not set(revoked).intersection(admission.surplus([*revoked, *crowd]))
     clock.now_s += NOTICE_S + 0.1
     assert set(revoked).intersection(admission.surplus([*revoked, *crowd]))

@@ -151,6 +151,42 @@ async def test_a_place_stays_while_a_stream_of_another_caller_is_open(ground: Gr
 
 
 @in_virtual_time
+async def test_a_place_left_to_the_caller_of_a_stream_is_lost_with_its_access(ground: Ground) -> None:
+    """The defect: the place stayed with the one that had lost access, and was never looked at again."""
+    peer = call_of().peer
+
+    async def answers(_request: Any, _call: CallContext) -> Any:
+        await ground.ping("anna")
+        ground.revoke("anna")
+        ground.auth.end_revoked()
+        yield b"a status"
+
+    ground.admission.take_token(peer)
+    await serve([ground.auth], "WatchSystemStatus", answers, token=ground.tokens["ben"].text())
+    assert not ground.admission.is_pending(peer)
+    ground.revoke("ben")
+    ground.auth.end_revoked()
+    assert ground.admission.is_pending(peer)
+
+
+@in_virtual_time
+async def test_the_end_of_a_revoked_stream_takes_no_place_of_the_newest_caller(ground: Ground) -> None:
+    peer = call_of().peer
+
+    async def answers(_request: Any, _call: CallContext) -> Any:
+        yield b"a status"
+        await ground.ping("ben")
+        ground.revoke("anna")
+        ground.auth.end_revoked()
+        yield b"another"
+
+    ground.admission.take_token(peer)
+    with pytest.raises(NotAuthenticatedError):
+        await serve([ground.auth], "WatchSystemStatus", answers, token=ground.tokens["anna"].text())
+    assert not ground.admission.is_pending(peer)
+
+
+@in_virtual_time
 async def test_a_caller_that_was_never_admitted_knows_no_secret(ground: Ground) -> None:
     await ground.ping("anna")
     ground.revoke("carla")
