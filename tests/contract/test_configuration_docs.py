@@ -156,7 +156,7 @@ def examples_of_cameras() -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("example", list(examples_of_cameras()))
+@pytest.mark.parametrize("example", examples_of_cameras())
 def test_the_examples_of_cameras_are_accepted_and_printed_as_they_are(example: str, tmp_path: Path) -> None:
     file, printed = tmp_path / "preview.yaml", tmp_path / "printed.yaml"
     file.write_text(example, encoding="utf-8")

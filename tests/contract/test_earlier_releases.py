@@ -1,7 +1,8 @@
 """What a robot of a released version has on its disk is good for this one: an upgrade keeps all of it.
 
-`released/VERSION` has a configuration with every key that the version documented, and a list of credentials
-in its form; a further release adds a folder. tests/e2e/containers/test_real_upgrade.py upgrades such a robot.
+`released/VERSION` has a configuration with the keys that the version documented, but for those that exclude
+others of them, and a list of credentials in its form; a further release adds a folder.
+tests/e2e/containers/test_real_upgrade.py upgrades such a robot.
 """
 
 from pathlib import Path

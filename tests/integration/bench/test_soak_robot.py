@@ -83,7 +83,7 @@ def compose() -> dict[str, Any]:
 
 
 def together_mib(processes: list[Reading]) -> float:
-    """Resident memory of processes, with what they share counted once."""
+    """Resident memory of processes, with what they share counted once: at least so much."""
     own = sum(each.resident_mib - each.shared_mib for each in processes)
     return own + max(each.shared_mib for each in processes)
 
