@@ -1,4 +1,4 @@
-"""Python's collector of garbage in programs that must answer in time."""
+"""Python's garbage collector in programs that must answer in time."""
 
 import gc
 

@@ -1,1 +1,4 @@
-"""The robot's connection to its fleet: its state, and the loops between outbox and hub."""
+"""The robot's connection to its fleet.
+
+Its state, the loops between outbox and hub, and the uploads as both see them.
+"""

@@ -23,8 +23,11 @@ _SENSE: Final = f"""
       AND typeof(earlier) = 'integer' AND typeof(probes) = 'integer'
       AND typeof(reason) = 'integer' AND reason BETWEEN 0 AND {max(DropReason)})
 """
-"""What holds for each row that can be sent; of an event's payload, encoding.py says more. `restore` changes
-nothing of it: the rest of an event's row does not count, and the gap in its place has what is asked here."""
+"""What holds for each row that can be sent; bridge/events/encoding.py says more of an event's payload.
+
+`restore` changes nothing of it: the rest of an event's row does not count, and the gap in its place has what
+is asked here.
+"""
 _NOT_AS_WRITTEN: Final = """
     typeof(severity) <> 'integer'
     OR typeof(payload) NOT IN ('null', 'blob')

@@ -31,7 +31,7 @@ _INK: Final = QColor("#000000")
 class DrivePlace(QWidget):
     """What the robot permits, a driver's buttons, and at the right end, where nothing moves it, STOP.
 
-    STOP is for every operator: it needs no driver, no lease and no more than the role of a viewer.
+    STOP is for callers of every role: it needs no driver and no lease.
     """
 
     stop_pressed = Signal()

@@ -1,7 +1,7 @@
 """One running pipeline, controlled from the event loop: start, watch, adjust, stop.
 
-supervisor.py has the table of what can fail and what follows. GStreamer's threads enter Python in few places
-only (framing.py, keyframe_gate.py, file_loop.py, source_end.py, access_units.py, camera_switch.py,
+preview/supervisor has the table of what can fail and what follows. GStreamer's threads enter Python in few
+places only (framing.py, keyframe_gate.py, file_loop.py, source_end.py, access_units.py, camera_switch.py,
 camera_decoder.py, viewer_limit.py). There they look at the stream, and schedule calls on the loop for what
 follows; for a single frame they do so only while it is recorded or cameras change. viewer_limit.py decides on
 SRT's thread, under a lock: a handshake waits for its answer.

@@ -1,4 +1,4 @@
-"""Brings the running pipeline to the camera that is to be live, as cameras.py decides."""
+"""Brings the running pipeline to the camera that is to be live, as state/cameras.py decides."""
 
 import asyncio
 import logging

@@ -14,7 +14,7 @@ What can fail, how it is noticed, and what follows:
 | port in use, address not local | ERROR of the listener | FAULTED, retry with backoff |
 | source fails or ends | ERROR of the source, EOS | its fallback; a file loops instead |
 | source stalls | watchdog: no frames come in | its fallback |
-| no fallback, or none that works | cameras.py | FAULTED, retry with backoff |
+| no fallback, or none that works | state/cameras.py | FAULTED, retry with backoff |
 | a camera to switch to fails | ERROR, EOS, no frame in time | the live one stays; retry with backoff |
 | a camera hangs when it has been replaced | deadline of the call | left behind; HungError when stopped |
 | encoder can't be opened or fails | ERROR of the encoder | next encoder at once |
@@ -42,7 +42,7 @@ encoder takes over, the pipeline is rebuilt whole, listener included: viewers lo
 tenths of a second and must reconnect, to a stream of possibly another codec.
 
 A fallback, and a camera that an operator chose, are started beside the live camera and take its place in the
-running pipeline (camera_switch.py): viewers stay connected. cameras.py decides which one is to be live.
+running pipeline (camera_switch.py): viewers stay connected. state/cameras.py decides which one is to be live.
 
 One pipeline serves two reasons: viewers (the desired state) and a recording (a reader of the video tap). It
 runs while there is one. The listener exists only for viewers, and comes and goes without a gap in the

@@ -187,6 +187,7 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
             (f"gateway/teleop/{name}.py", ("asyncio", "time", "gateway.links"))
             for name in ("lease", "pacing")
         ),
+        ("preview/state/", (*HEAVY, *WIRE, "asyncio")),
         ("preview/state/lifecycle.py", (*HEAVY, *WIRE, "asyncio", "preview")),
         ("preview/state/values.py", (*HEAVY, *WIRE, "asyncio", "preview.pipeline", "preview.encoders")),
         ("preview/config/", (*HEAVY, *WIRE, "asyncio", "preview.pipeline")),

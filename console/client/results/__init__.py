@@ -19,6 +19,7 @@ from console.client.results.driving import (
     DrivePhase,
     DriveState,
     RobotStopped,
+    SpeedLimits,
     StopLatch,
     StopReset,
     Supervision,

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 
 class DrivePhase(Enum):
@@ -65,6 +66,14 @@ class StopLatch:
     age_ms: int
 
 
+class SpeedLimits(NamedTuple):
+    """The largest speeds, each in both directions."""
+
+    vx_mps: float
+    vy_mps: float
+    wz_rad_s: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveLimits:
     """What the robot accepts. Faster commands are slowed down, all components by one factor."""
@@ -84,14 +93,11 @@ class DriveLimits:
     line_of_sight_mps: float
     line_of_sight_rad_s: float
 
-    def permitted(self, supervision: Supervision) -> tuple[float, float, float]:
-        """Returns the largest vx and vy in m/s, and turning rate in rad/s, that the robot accepts.
-
-        What the picture's age permits may be less.
-        """
+    def permitted(self, supervision: Supervision) -> SpeedLimits:
+        """Returns the largest speeds that the robot accepts. What the picture's age permits may be less."""
         if supervision is not Supervision.LINE_OF_SIGHT:
-            return self.max_vx_mps, self.max_vy_mps, self.max_wz_rad_s
-        return (
+            return SpeedLimits(self.max_vx_mps, self.max_vy_mps, self.max_wz_rad_s)
+        return SpeedLimits(
             min(self.max_vx_mps, self.line_of_sight_mps),
             min(self.max_vy_mps, self.line_of_sight_mps),
             min(self.max_wz_rad_s, self.line_of_sight_rad_s),

@@ -36,7 +36,7 @@ class ExposureLog:
 
 
 def video_exposure(settings: GatewaySettings, listener: Listener) -> Finding:
-    """Returns a finding for the log and the doctor: a note if viewers need no passphrase."""
+    """Returns a finding for log and doctor: a note if viewers on other machines need no passphrase."""
     at = f"{bracketed(listener.address) or 'an unknown address'}, UDP port {listener.port}"
     if settings.encrypts_preview(listener.address):
         return good("video", f"the video is encrypted; its listener is at {at}")

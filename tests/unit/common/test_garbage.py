@@ -1,4 +1,4 @@
-"""What a program keeps until its end is no work for the collector of garbage."""
+"""What a program keeps until its end is no work for the garbage collector."""
 
 import gc
 import weakref

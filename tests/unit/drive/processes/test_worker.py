@@ -35,7 +35,8 @@ class World:
         self.guard_says = deque([b"1"])
         self.sequence = 0
         monkeypatch.setattr(worker_module, "time", SimpleNamespace(monotonic_ns=lambda: self.now_ns))
-        monkeypatch.setattr(worker_module, "gc", SimpleNamespace(collect=int, freeze=int, disable=int))
+        monkeypatch.setattr(worker_module, "gc", SimpleNamespace(collect=int, disable=int))
+        monkeypatch.setattr(worker_module, "freeze_objects", lambda: None)
         start = state or State.at_start(START_NS, enabled=True)
         port: Any = self
         self.worker = Worker(port, port, port, Rules(), start)
