@@ -60,8 +60,10 @@ as_root debootstrap --variant=minbase --arch "$arch" "$suite" "$root/system" "$m
   { tail -n 10 ".cache/base-image-$suite-$arch.log" >&2; fail "debootstrap failed; the lines above say why"; }
 sources | sed 's/^/deb /' | as_root tee "$root/system/etc/apt/sources.list" > /dev/null
 # The official slim image leaves these out as well: a container needs no manual pages.
-as_root rm -rf "$root/system/var/cache/apt/archives" "$root/system"/usr/share/{doc,man,info,locale}/* \
-  "$root/system"/var/lib/apt/lists/*
+as_root rm -rf "$root/system"/usr/share/{doc,man,info,locale}/*
+# Of this computer; containers get theirs.
+as_root rm -f "$root/system"/etc/{hostname,resolv.conf}
+as_root docker/packages clean "$root/system"
 printf 'path-exclude /usr/share/%s/*\n' doc man info locale |
   as_root tee "$root/system/etc/dpkg/dpkg.cfg.d/slim" > /dev/null
 # Built, not imported: Docker 20.10 takes every import for one of this machine's processor.

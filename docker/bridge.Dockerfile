@@ -4,15 +4,11 @@ ARG DEBIAN_IMAGE=debian:bookworm-slim
 
 FROM ${DEBIAN_IMAGE} AS system
 # The certificates: of stores whose authority the world knows (uploads.ca names any other). tzdata: the zones of
-# uploads.time_zone; where the base lacks it, debconf would ask which of them is the computer's.
-RUN apt-get update \
- && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends ca-certificates python3 tini tzdata \
- && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
+# uploads.time_zone.
+RUN --mount=type=bind,source=docker/packages,target=/run/packages /run/packages install ca-certificates python3 tini tzdata
 
 FROM ${DEBIAN_IMAGE} AS built
-RUN apt-get update \
- && apt-get install -y --no-install-recommends python3-venv \
- && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
+RUN --mount=type=bind,source=docker/packages,target=/run/packages /run/packages install python3-venv
 WORKDIR /opt/robot-gateway
 COPY docker/fetching.sh docker/
 COPY requirements/tools.txt requirements/bridge.txt requirements/
@@ -37,7 +33,9 @@ COPY simrobot simrobot
 COPY tap tap
 COPY proto/python proto/python
 RUN .cache/tools/bin/python -m hatchling build -t wheel \
- && .cache/tools/bin/uv pip install --quiet --offline --no-deps --compile-bytecode --python .venv/bin/python dist/*.whl \
+ # Without a note of when that was.
+ && UV_NO_INSTALLER_METADATA=1 .cache/tools/bin/uv pip install --quiet --offline --no-deps --compile-bytecode \
+      --python .venv/bin/python dist/*.whl \
  && .venv/bin/robot-bridge --help > /dev/null
 
 FROM system

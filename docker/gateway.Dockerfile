@@ -8,14 +8,10 @@ ARG DEBIAN_IMAGE=debian:bookworm-slim
 ARG ROS_IMAGE=ros:jazzy-ros-core
 
 FROM ${DEBIAN_IMAGE} AS system-wheels
-RUN apt-get update \
- && apt-get install -y --no-install-recommends python3 tini \
- && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
+RUN --mount=type=bind,source=docker/packages,target=/run/packages /run/packages install python3 tini
 
 FROM ${ROS_IMAGE} AS system-packages
-RUN apt-get update \
- && apt-get install -y --no-install-recommends ros-jazzy-vision-msgs tini \
- && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
+RUN --mount=type=bind,source=docker/packages,target=/run/packages /run/packages install ros-jazzy-vision-msgs tini
 # What sourcing setup.sh would set, for every process of the container and without a shell.
 ENV AMENT_PREFIX_PATH=/opt/robot-gateway/ros:/opt/ros/jazzy \
     LD_LIBRARY_PATH=/opt/robot-gateway/ros/lib:/opt/ros/jazzy/lib:/opt/ros/jazzy/lib/aarch64-linux-gnu:/opt/ros/jazzy/lib/x86_64-linux-gnu \
@@ -24,9 +20,7 @@ ENV AMENT_PREFIX_PATH=/opt/robot-gateway/ros:/opt/ros/jazzy \
 FROM system-${ROS} AS system
 
 FROM system AS tools
-RUN apt-get update \
- && apt-get install -y --no-install-recommends cmake g++ ninja-build python3-dev python3-venv \
- && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
+RUN --mount=type=bind,source=docker/packages,target=/run/packages /run/packages install cmake g++ ninja-build python3-dev python3-venv
 WORKDIR /opt/robot-gateway
 COPY docker/fetching.sh docker/
 COPY requirements/tools.txt requirements/
@@ -48,9 +42,7 @@ RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh 
  && mkdir ros
 
 FROM tools AS rclpy-packages
-RUN apt-get update \
- && apt-get install -y --no-install-recommends ca-certificates git \
- && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
+RUN --mount=type=bind,source=docker/packages,target=/run/packages /run/packages install ca-certificates git
 COPY requirements/gateway.txt requirements/recorder.txt requirements/
 RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh \
  && python3 -m venv --without-pip --system-site-packages .venv \
@@ -84,7 +76,9 @@ COPY simrobot simrobot
 COPY tap tap
 COPY proto/python proto/python
 RUN .cache/tools/bin/python -m hatchling build -t wheel \
- && .cache/tools/bin/uv pip install --quiet --offline --no-deps --compile-bytecode --python .venv/bin/python dist/*.whl \
+ # Without a note of when that was.
+ && UV_NO_INSTALLER_METADATA=1 .cache/tools/bin/uv pip install --quiet --offline --no-deps --compile-bytecode \
+      --python .venv/bin/python dist/*.whl \
  && .venv/bin/robot-gateway --help > /dev/null
 
 FROM system AS installed

@@ -5,22 +5,17 @@ ARG DEBIAN_IMAGE=debian:bookworm-slim
 
 FROM ${DEBIAN_IMAGE} AS system
 ARG EXTRA_PACKAGES=""
-RUN apt-get update \
- && apt-get install -y --no-install-recommends \
+RUN --mount=type=bind,source=docker/packages,target=/run/packages \
+    /run/packages install \
       gir1.2-gst-plugins-base-1.0 gir1.2-gstreamer-1.0 \
       gstreamer1.0-plugins-bad gstreamer1.0-plugins-base gstreamer1.0-plugins-good gstreamer1.0-plugins-ugly \
-      python3 python3-gi tini ${EXTRA_PACKAGES} \
- && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
-COPY docker/vendor /tmp/vendor
-RUN if ls /tmp/vendor/*.deb > /dev/null 2>&1; then \
-      apt-get update && apt-get install -y --no-install-recommends /tmp/vendor/*.deb && rm -rf /var/lib/apt/lists/* /var/cache/apt/*; \
-    fi; \
-    rm -rf /tmp/vendor
+      python3 python3-gi tini ${EXTRA_PACKAGES}
+RUN --mount=type=bind,source=docker/packages,target=/run/packages \
+    --mount=type=bind,source=docker/vendor,target=/mnt \
+    if ls /mnt/*.deb > /dev/null 2>&1; then /run/packages install /mnt/*.deb; fi
 
 FROM ${DEBIAN_IMAGE} AS built
-RUN apt-get update \
- && apt-get install -y --no-install-recommends python3-venv \
- && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
+RUN --mount=type=bind,source=docker/packages,target=/run/packages /run/packages install python3-venv
 WORKDIR /opt/robot-gateway
 COPY docker/fetching.sh docker/
 COPY requirements/tools.txt requirements/preview-image.txt requirements/
@@ -45,7 +40,9 @@ COPY simrobot simrobot
 COPY tap tap
 COPY proto/python proto/python
 RUN .cache/tools/bin/python -m hatchling build -t wheel \
- && .cache/tools/bin/uv pip install --quiet --offline --no-deps --compile-bytecode --python .venv/bin/python dist/*.whl \
+ # Without a note of when that was.
+ && UV_NO_INSTALLER_METADATA=1 .cache/tools/bin/uv pip install --quiet --offline --no-deps --compile-bytecode \
+      --python .venv/bin/python dist/*.whl \
  && .venv/bin/robot-preview --help > /dev/null
 
 FROM system

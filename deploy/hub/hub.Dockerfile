@@ -2,14 +2,10 @@
 ARG DEBIAN_IMAGE=debian:bookworm-slim
 
 FROM ${DEBIAN_IMAGE} AS system
-RUN apt-get update \
- && apt-get install -y --no-install-recommends python3 tini \
- && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
+RUN --mount=type=bind,source=docker/packages,target=/run/packages /run/packages install python3 tini
 
 FROM ${DEBIAN_IMAGE} AS built
-RUN apt-get update \
- && apt-get install -y --no-install-recommends python3-venv \
- && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
+RUN --mount=type=bind,source=docker/packages,target=/run/packages /run/packages install python3-venv
 WORKDIR /opt/robot-gateway
 COPY docker/fetching.sh docker/
 COPY requirements/tools.txt requirements/hub.txt requirements/
@@ -34,7 +30,9 @@ COPY simrobot simrobot
 COPY tap tap
 COPY proto/python proto/python
 RUN .cache/tools/bin/python -m hatchling build -t wheel \
- && .cache/tools/bin/uv pip install --quiet --offline --no-deps --compile-bytecode --python .venv/bin/python dist/*.whl \
+ # Without a note of when that was.
+ && UV_NO_INSTALLER_METADATA=1 .cache/tools/bin/uv pip install --quiet --offline --no-deps --compile-bytecode \
+      --python .venv/bin/python dist/*.whl \
  && .venv/bin/robot-bridge hub --help > /dev/null
 
 FROM system
