@@ -1,8 +1,11 @@
 """scripts/images without an engine: what it refuses and warns of, and how it reads an engine's answers."""
 
 import gzip
+import io
+import json
 import os
 import subprocess
+import tarfile
 from pathlib import Path
 
 import pytest
@@ -108,3 +111,110 @@ def test_without_an_engine_no_image_is_to_be_pulled(tmp_path: Path) -> None:
     assert (printed.returncode, printed.stdout) == (1, "")
     assert "docker/engine start" in printed.stderr
     assert "docker pull" not in printed.stderr
+
+
+def save_of(directory: Path, time: str) -> Path:
+    """An archive as `docker save` writes it: of one image, made at this time, without layers."""
+    configuration = {
+        "created": time,
+        "config": {"Labels": {"com.docker.compose.project": "lab7"}},
+        "history": [{"created": time}],
+        "rootfs": {"type": "layers", "diff_ids": []},
+    }
+    manifest = [{"Config": "one.json", "RepoTags": ["robot-bridge:1.4.0"], "Layers": []}]
+    file = directory / "save"
+    with tarfile.open(file, "w") as archive:
+        for name, value in (("one.json", configuration), ("manifest.json", manifest)):
+            content = json.dumps(value).encode()
+            info = tarfile.TarInfo(name)
+            info.size = len(content)
+            archive.addfile(info, io.BytesIO(content))
+    return file
+
+
+ENGINE = """#!/bin/sh
+echo "$*" >> "$(dirname "$0")/calls"
+case "$1 $2" in
+  "save --output") cp "$(dirname "$0")/save" "$3" ;;
+  "load ") cat > "$(dirname "$0")/loaded" ;;
+  "image inspect") echo 0 ;;
+  "version "*) echo 28 ;;
+esac
+"""
+
+
+@pytest.fixture
+def engine(tmp_path: Path) -> Path:
+    """The directory of an engine's double: what it is asked, what it loads, and `save`, what it saves."""
+    directory = tmp_path / "engine"
+    directory.mkdir()
+    (directory / "docker").write_text(ENGINE)
+    (directory / "docker").chmod(0o755)
+    return directory
+
+
+def build(engine: Path, *words: str, **variables: str) -> str:
+    """Builds with the double; returns what it was asked."""
+    ended = scripts_images(
+        "build", "--ros", "packages", *words, PATH=f"{engine}:{os.environ['PATH']}", TAG="1.4.0", **variables
+    )
+    assert ended.returncode == 0, ended.stderr
+    return (engine / "calls").read_text()
+
+
+def test_two_builds_with_the_time_of_their_sources_are_the_same_image(engine: Path) -> None:
+    loaded = []
+    for time in ("2026-11-28T10:15:24.746349172Z", "2026-11-29T00:00:00Z"):
+        save_of(engine, time)
+        asked = build(engine, "robot-bridge", SOURCE_DATE_EPOCH="1767323045")
+        (saved,) = (line for line in asked.splitlines() if line.startswith("save "))
+        assert saved.endswith(" robot-bridge:1.4.0")
+        (engine / "calls").unlink()
+        loaded.append((engine / "loaded").read_bytes())
+    assert loaded[0] == loaded[1]
+    assert b'"created":"2026-01-02T03:04:05Z"' in loaded[0]
+
+
+def test_without_that_time_what_was_built_stays_as_it_is(engine: Path) -> None:
+    asked = build(engine, "robot-bridge", SOURCE_DATE_EPOCH="")
+    assert "save" not in asked
+    assert not (engine / "loaded").exists()
+
+
+def test_an_archive_that_can_not_be_read_ends_the_build(engine: Path) -> None:
+    (engine / "save").write_bytes(b"no archive")
+    ended = scripts_images(
+        "build", "--ros", "packages", PATH=f"{engine}:{os.environ['PATH']}", SOURCE_DATE_EPOCH="1767323045"
+    )
+    assert ended.returncode == 1
+    assert "the times of the images can't be set" in ended.stderr
+    assert not list((ROOT / ".cache").glob("images.*"))
+
+
+def test_nothing_is_taken_over_where_that_is_asked(engine: Path) -> None:
+    build(engine, "--no-cache", "robot-bridge", SOURCE_DATE_EPOCH="")
+    asked = build(engine, "robot-bridge", SOURCE_DATE_EPOCH="")
+    composed = [line for line in asked.splitlines() if line.startswith("compose ")]
+    assert composed == [
+        "compose --progress quiet build --no-cache bridge",
+        "compose --progress quiet build bridge",
+    ]
+
+
+def test_images_are_saved_as_they_are_and_as_the_same_bytes(engine: Path, tmp_path: Path) -> None:
+    saved: list[bytes] = []
+    for name in ("first", "second"):
+        os.utime(save_of(engine, "2026-11-28T10:15:24Z"), (len(saved), len(saved)))
+        ended = scripts_images("save", tmp_path / name, "robot-bridge", PATH=f"{engine}:{os.environ['PATH']}")
+        assert ended.returncode == 0, ended.stderr
+        saved.append((tmp_path / name).read_bytes())
+    assert saved[0] == saved[1]
+    assert b'"created": "2026-11-28T10:15:24Z"' in gzip.decompress(saved[0])
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["engine", "first", "second"]
+
+
+def test_an_image_that_does_not_exist_is_not_saved(engine: Path, tmp_path: Path) -> None:
+    ended = scripts_images("save", tmp_path / "file", "robot-arm", PATH=f"{engine}:{os.environ['PATH']}")
+    assert ended.returncode == 2
+    assert "usage: scripts/images" in ended.stderr
+    assert not (tmp_path / "file").exists()
