@@ -50,6 +50,11 @@ def main() -> int:
         default="linux/amd64",
         help="of the robots that the images are for; linux/amd64 by default",
     )
+    parser.add_argument(
+        "--no-cache",
+        action="store_true",
+        help="take nothing over from earlier builds of the images: the newest Debian packages",
+    )
     options = parser.parse_args()
     platform = None if options.without_images else options.platform
     name = f"robot-gateway-{options.version}{images.PLATFORMS[platform] if platform else ''}"
@@ -57,7 +62,7 @@ def main() -> int:
     try:
         commit = _permitted(options.version)
         pythons = tuple(options.python or _PYTHONS)
-        _make(options.version, commit, output, pythons, platform)
+        _make(options.version, commit, output, pythons, platform, anew=options.no_cache)
     except UserError as error:
         print(f"release: {error}", file=sys.stderr)
         return int(error.exit_code)
@@ -94,9 +99,18 @@ def _project_version() -> str:
 
 
 def _make(
-    version: str, commit: git.Commit, output: Path, pythons: tuple[str, ...], platform: str | None
+    version: str,
+    commit: git.Commit,
+    output: Path,
+    pythons: tuple[str, ...],
+    platform: str | None,
+    *,
+    anew: bool,
 ) -> None:
-    """Makes all parts beside `output`, which appears when all are complete; no images without a platform."""
+    """Makes all parts beside `output`, which appears when all are complete; no images without a platform.
+
+    With `anew`, the images take nothing over from earlier builds.
+    """
     if output.exists():
         raise UserError(f"{output} exists", f"Type: rm -r {output}, or name another one with --output")
     output.parent.mkdir(parents=True, exist_ok=True)
@@ -132,16 +146,16 @@ def _make(
             made / "sbom" / f"without_docker-{version}.cdx.json",
             commit.epoch_s,
         )
-        tag = _add_images(made, version, commit, platform) if platform else ""
+        tag = _add_images(made, version, commit, platform, anew=anew) if platform else ""
         _write_texts(made, tree, version, commit, tag)
         write_sums(made)
         made.rename(output)
 
 
-def _add_images(made: Path, version: str, commit: git.Commit, platform: str) -> str:
+def _add_images(made: Path, version: str, commit: git.Commit, platform: str, *, anew: bool) -> str:
     """Returns their tag."""
     _say(f"building the images for {platform}")
-    tag = images.build(_ROOT, version, platform)
+    tag = images.build(_ROOT, version, platform, commit.epoch_s, anew=anew)
     _say("saving them, and listing what is in them")
     (made / "images").mkdir()
     for image in images.save(_ROOT, tag, made / "images"):

@@ -14,21 +14,25 @@ _SAVE_WITHIN_S: Final = 1200.0
 _INSPECT_WITHIN_S: Final = 120.0
 
 
-def build(root: Path, version: str, platform: str) -> str:
+def build(root: Path, version: str, platform: str, epoch_s: int, *, anew: bool = False) -> str:
     """Builds the images, and returns their tag; .env and COMPOSE_FILE count, as in scripts/images.
 
     Args:
         root: of the source tree.
         version: what the tag begins with.
         platform: one of PLATFORMS.
+        epoch_s: the images' time: seconds since 1970.
+        anew: take nothing over from earlier builds, so that the packages are the newest.
 
     Raises:
         UserError: no engine answers, programs of the platform can't run here, or a build fails.
     """
+    options = ["--no-cache"] if anew else []
     run(
         *(root / "scripts/images", "build", "--platform", platform),
+        *options,
         within_s=_BUILD_WITHIN_S,
-        environment={"TAG": version},
+        environment={"TAG": version, "SOURCE_DATE_EPOCH": str(epoch_s)},
     )
     return version + PLATFORMS[platform]
 

@@ -115,6 +115,16 @@ def release(
     )
 
 
+def remove_images(repository: Path, *names: str) -> None:
+    """Removes images built of a repository: those of these names, and those that had the names before."""
+    revision = git(repository, "rev-parse", "HEAD").strip()
+    dangling = ("--filter=dangling=true", f"--filter=label=org.opencontainers.image.revision={revision}")
+    listed = ["docker", "image", "ls", "--quiet", "--no-trunc", *dangling]
+    left = subprocess.run(listed, capture_output=True, text=True, timeout=60, check=True).stdout.split()
+    command = ["docker", "image", "rm", "--force", *names, *dict.fromkeys(left)]
+    subprocess.run(command, capture_output=True, timeout=120, check=False)
+
+
 def alone(*command: str | Path, **variables: str) -> subprocess.CompletedProcess[str]:
     """Runs a command in a network namespace of its own: it reaches nothing, not even this machine."""
     dropped = ("PYTHONPATH", "VIRTUAL_ENV", "PIP_FIND_LINKS", "PIP_INDEX_URL", "PIP_EXTRA_INDEX_URL")

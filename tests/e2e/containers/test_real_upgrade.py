@@ -20,7 +20,7 @@ from console.robots.login import parse_login
 from tests.support.engine import ROOT, TAG
 from tests.support.free import free_domain, free_tcp_port, free_udp_port
 from tests.support.patient import PATIENT
-from tests.support.release import VERSION, release, released_repository
+from tests.support.release import VERSION, release, released_repository, remove_images
 from tests.support.waiting import wait_until
 
 pytestmark = [pytest.mark.on_request, pytest.mark.docker, pytest.mark.timeout(1500)]
@@ -45,8 +45,7 @@ def made(tmp_path_factory: pytest.TempPathFactory, images: str) -> Iterator[Path
     )
     assert ended.returncode == 0, ended.stderr
     yield directory / "made"
-    names = [f"{image}:{VERSION}" for image in IMAGES]
-    subprocess.run(["docker", "image", "rm", "--force", *names], capture_output=True, check=False)
+    remove_images(repository, *(f"{image}:{VERSION}" for image in IMAGES))
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from release_program.images import PLATFORMS, build, save
 from tests.support.engine import ROOT
 
 STAND_IN = """#!/bin/sh
-echo "$TAG: $*" >> "$(dirname "$0")/calls"
+echo "$TAG${SOURCE_DATE_EPOCH:+ of $SOURCE_DATE_EPOCH}: $*" >> "$(dirname "$0")/calls"
 case "$1" in
   ids) echo "robot-gateway:$TAG sha256:0"; echo "robot-preview:$TAG sha256:1" ;;
   save) echo "images" > "$2" ;;
@@ -30,13 +30,22 @@ def root(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize(("platform", "tag"), [("linux/amd64", "1.4.0"), ("linux/arm64", "1.4.0-arm64")])
 def test_those_of_another_processor_have_a_tag_of_their_own(root: Path, platform: str, tag: str) -> None:
-    assert build(root, "1.4.0", platform) == tag
+    assert build(root, "1.4.0", platform, 1767323045) == tag
     assert save(root, tag, root) == [f"robot-gateway:{tag}", f"robot-preview:{tag}"]
     calls = (root / "scripts/calls").read_text().splitlines()
     file = root / f"robot-images-{tag}.tar.gz"
-    assert calls == [f"1.4.0: build --platform {platform}", f"{tag}: ids", f"{tag}: save {file}"]
+    assert calls == [
+        f"1.4.0 of 1767323045: build --platform {platform}",
+        f"{tag}: ids",
+        f"{tag}: save {file}",
+    ]
     assert file.is_file()
     assert (root / "IMAGES").read_text().startswith(f"robot-gateway:{tag} sha256:0\n")
+
+
+def test_with_the_newest_packages_where_that_is_asked(root: Path) -> None:
+    build(root, "1.4.0", "linux/amd64", 1767323045, anew=True)
+    assert (root / "scripts/calls").read_text().endswith(": build --platform linux/amd64 --no-cache\n")
 
 
 @pytest.mark.parametrize("platform", PLATFORMS)
