@@ -3,6 +3,7 @@
 import argparse
 import sys
 import tarfile
+import zlib
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -27,7 +28,7 @@ def main() -> int:
     except UserError as error:
         print(f"images: {error}", file=sys.stderr)
         return int(error.exit_code)
-    except (OSError, tarfile.TarError) as error:
+    except (EOFError, OSError, ValueError, tarfile.TarError, zlib.error) as error:
         print(f"images: {options.saved}: {error}", file=sys.stderr)
         return 1
     return 0

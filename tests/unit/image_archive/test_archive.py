@@ -93,6 +93,30 @@ def saved(file: Path, *images: Image, time_s: int = 0, compressed: bool = False)
     return file
 
 
+def saved_as_oci_layout(file: Path, *images: Image, compressed: bool) -> Path:
+    """Writes what `docker save` of Docker 25 and later does: an OCI layout, with the older list beside it."""
+    entries = {"oci-layout": entry("oci-layout", b'{"imageLayoutVersion": "1.0.0"}')}
+
+    def blob(content: bytes) -> str:
+        name = f"blobs/sha256/{hashlib.sha256(content).hexdigest()}"
+        entries[name] = entry(name, content)
+        return name
+
+    manifest = [
+        {
+            "Config": blob(image.configuration()),
+            "RepoTags": [f"{image.name}:1"],
+            "Layers": [
+                blob(gzip.compress(layer, mtime=0) if compressed else layer) for layer in image.layers
+            ],
+        }
+        for image in images
+    ]
+    entries["manifest.json"] = entry("manifest.json", json.dumps(manifest).encode())
+    file.write_bytes(tar(*entries.values()))
+    return file
+
+
 def written(file: Path, created: datetime | None = CREATED) -> bytes:
     sink = io.BytesIO()
     write(file, sink, created)
@@ -182,6 +206,25 @@ def test_without_a_time_images_stay_what_they_are(tmp_path: Path, compressed: bo
     assert archive == written(saved(tmp_path / "other", other, image, time_s=LATER_S), None)
 
 
+@pytest.mark.parametrize("compressed", [False, True], ids=["classic store", "containerd store"])
+def test_an_oci_layout_is_read_as_the_same_images(tmp_path: Path, compressed: bool) -> None:
+    images = Image("gateway", [base(), own()]), Image("drive", [base()])
+    layout = saved_as_oci_layout(tmp_path / "layout", *images, compressed=compressed)
+    assert written(layout) == written(saved(tmp_path / "saved", *images))
+    assert written(layout, None) == written(tmp_path / "saved", None)
+
+
+def test_an_image_without_layers_is_read(tmp_path: Path) -> None:
+    """In Go an empty list may be null."""
+    configuration = json.dumps({"config": None, "rootfs": {"type": "layers", "diff_ids": None}}).encode()
+    manifest = [{"Config": "one.json", "RepoTags": None, "Layers": None}]
+    listed = entry("manifest.json", json.dumps(manifest).encode())
+    (tmp_path / "saved").write_bytes(tar(entry("one.json", configuration), listed))
+    assert configuration in contents(written(tmp_path / "saved", None)).values()
+    (written_manifest,) = json.loads(contents(written(tmp_path / "saved"))["manifest.json"])
+    assert (written_manifest["RepoTags"], written_manifest["Layers"]) == ([], [])
+
+
 def test_one_image_with_two_names_is_one_with_two_names(tmp_path: Path) -> None:
     image = Image("gateway", [base()])
     files = contents(written(saved(tmp_path / "saved", image, replace(image, name="latest"))))
@@ -197,7 +240,7 @@ def test_what_was_written_once_is_written_as_the_same_again(tmp_path: Path) -> N
 
 
 def test_files_keep_all_but_their_times(tmp_path: Path) -> None:
-    """Long names, links, owners, modes, and extended attributes, which are no text."""
+    """Names, links, devices, owners, modes, and extended attributes, which are no text."""
     capability = b"\x01\x00\x00\x02\x00\xff".decode("utf-8", "surrogateescape")
     long_name = f"opt/{'a' * 120}/{'b' * 120}"
     layer = tar(
@@ -207,19 +250,65 @@ def test_files_keep_all_but_their_times(tmp_path: Path) -> None:
         entry("usr/bin/link", type=tarfile.SYMTYPE, linkname="ping"),
         entry("usr/bin/same", type=tarfile.LNKTYPE, linkname="usr/bin/ping"),
         entry("usr/share/.wh.doc"),
+        entry("usr/share/man/.wh..wh..opq"),
+        entry("usr/share/\udcff\u00e4", b"named", uid=3_000_000),
+        entry("dev/null", type=tarfile.CHRTYPE, devmajor=1, devminor=3, mode=0o666),
+        entry("dev/sda", type=tarfile.BLKTYPE, devmajor=8),
+        entry("run/pipe", type=tarfile.FIFOTYPE),
+        entry("of-a-type-that-tarfile-does-not-know", b"content", type=b"V"),
+        entry("last", b"last"),
     )
     _, (normalized,) = image_of(written(saved(tmp_path / "saved", Image("gateway", [layer]))), "gateway")
     with (
         tarfile.open(fileobj=io.BytesIO(layer)) as before,
         tarfile.open(fileobj=io.BytesIO(normalized)) as after,
     ):
-        kept = ("name", "mode", "uid", "gid", "type", "linkname", "size")
+        kept = ("name", "devmajor", "devminor", "mode", "uid", "gid", "type", "linkname", "size")
         assert [[getattr(each, name) for name in kept] for each in after.getmembers()] == [
             [getattr(each, name) for name in kept] for each in before.getmembers()
         ]
         assert {each.mtime for each in after.getmembers()} == {FILE_TIME_S}
         assert after.getmember("usr/bin/ping").pax_headers["SCHILY.xattr.security.capability"] == capability
     assert contents(normalized) == contents(layer)
+    _, again = image_of(written(saved(tmp_path / "again", Image("gateway", [normalized]))), "gateway")
+    assert again == [normalized]
+
+
+@pytest.mark.parametrize("form", ["gnu", "pax"])
+def test_a_file_with_holes_keeps_its_content(tmp_path: Path, form: str) -> None:
+    with (tmp_path / "holes").open("wb") as file:
+        file.write(b"begin")
+        file.seek(1 << 20)
+        file.write(b"end")
+    (tmp_path / "next").write_text("next")
+    layer = subprocess.run(
+        ["tar", "--sparse", f"--format={form}", "-c", "-C", tmp_path, "holes", "next"],
+        capture_output=True,
+        timeout=30,
+        check=True,
+    ).stdout
+    assert len(layer) < 1 << 20
+    _, (normalized,) = image_of(written(saved(tmp_path / "saved", Image("gateway", [layer]))), "gateway")
+    assert contents(normalized) == {
+        "holes": b"begin" + bytes((1 << 20) - 5) + b"end",
+        "next": b"next",
+    }
+    with tarfile.open(fileobj=io.BytesIO(normalized)) as archive:
+        assert not [each.name for each in archive if each.issparse()]
+
+
+def test_names_are_the_same_bytes_in_any_language(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """GNU tar's format does not say how a name is encoded; tarfile takes the computer's encoding."""
+    packed = io.BytesIO()
+    with tarfile.open(fileobj=packed, mode="w", format=tarfile.GNU_FORMAT, encoding="utf-8") as archive:
+        archive.addfile(entry("usr/share/\u00e4")[0])
+    file = saved(tmp_path / "saved", Image("gateway", [packed.getvalue()]))
+    expected = written(file)
+    monkeypatch.setattr(tarfile.TarFile, "encoding", "iso8859-1")
+    assert written(file) == expected
+    monkeypatch.undo()
+    _, (normalized,) = image_of(expected, "gateway")
+    assert list(contents(normalized)) == ["usr/share/\u00e4"]
 
 
 def compiled(directory: Path, mode: py_compile.PycInvalidationMode, *, stale: bool = False) -> bytes:
@@ -241,6 +330,7 @@ def compiled(directory: Path, mode: py_compile.PycInvalidationMode, *, stale: bo
         (py_compile.PycInvalidationMode.TIMESTAMP, False, True),
         (py_compile.PycInvalidationMode.TIMESTAMP, True, False),
         (py_compile.PycInvalidationMode.CHECKED_HASH, False, True),
+        (py_compile.PycInvalidationMode.UNCHECKED_HASH, False, True),
     ],
 )
 def test_python_takes_a_compiled_module_as_it_did_before(
@@ -270,11 +360,34 @@ def test_a_compiled_module_does_not_name_the_time_of_the_build(tmp_path: Path) -
     assert BUILT_S.to_bytes(4, "little") not in normalized
 
 
-def test_a_damaged_layer_is_not_passed_on(tmp_path: Path) -> None:
+@pytest.mark.parametrize("created", [None, CREATED])
+def test_a_damaged_layer_is_not_passed_on(tmp_path: Path, created: datetime | None) -> None:
     file = saved(tmp_path / "saved", Image("gateway", [own()]))
     file.write_bytes(file.read_bytes().replace(b"robot\x00", b"rebot\x00"))
     with pytest.raises(UserError, match=r"^the layer sha256:[0-9a-f]{64} is damaged"):
+        written(file, created)
+
+
+def test_a_header_that_can_not_be_read_does_not_end_a_layer(tmp_path: Path) -> None:
+    """To tarfile it is the end of the archive: what follows would be lost."""
+    layer = bytearray(base())
+    assert layer[512:].startswith(b"etc/passwd")
+    layer[512 + 148] ^= 1  # of the checksum
+    file = saved(tmp_path / "saved", Image("gateway", [bytes(layer)]))
+    with pytest.raises(tarfile.ReadError, match="the header at byte 512 "):
+        written(file)
+
+
+def test_a_compression_that_can_not_be_read_is_named(tmp_path: Path) -> None:
+    file = saved(tmp_path / "saved", Image("gateway", [b"\x28\xb5\x2f\xfd and more"]))
+    with pytest.raises(UserError, match=r"is compressed with zstd.*gzip"):
         written(file, None)
+
+
+def assert_named(ended: subprocess.CompletedProcess[bytes]) -> None:
+    assert (ended.returncode, ended.stdout) == (1, b"")
+    assert ended.stderr.startswith(b"images: ")
+    assert len(ended.stderr.splitlines()) == 1
 
 
 def program(file: Path, *options: str) -> subprocess.CompletedProcess[bytes]:
@@ -295,7 +408,19 @@ def test_the_program_writes_the_archive(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("content", "said"),
-    [(None, "No such file"), (b"no archive", "images: "), (tar(), "has no file manifest.json")],
+    [
+        (None, "No such file"),
+        (b"no archive", "images: "),
+        (tar(), "has no file manifest.json"),
+        (
+            tar(entry("manifest.json", type=tarfile.SYMTYPE, linkname="manifest.json")),
+            "has no file manifest.json",
+        ),
+        (tar(entry("manifest.json", b"no list")), "describes no images"),
+        (tar(entry("manifest.json", b"[{}]")), "describes no images"),
+        (tar(entry("manifest.json", b"[" * 100_000)), "describes no images"),
+    ],
+    ids=["missing", "no archive", "empty", "circular", "no list", "no image", "nested"],
 )
 def test_what_is_no_archive_of_images_is_named_in_one_line(
     tmp_path: Path, content: bytes | None, said: str
@@ -304,6 +429,27 @@ def test_what_is_no_archive_of_images_is_named_in_one_line(
     if content is not None:
         file.write_bytes(content)
     ended = program(file)
-    assert (ended.returncode, ended.stdout) == (1, b"")
+    assert_named(ended)
     assert said in ended.stderr.decode()
-    assert len(ended.stderr.splitlines()) == 1
+
+
+def test_a_manifest_without_end_is_not_read(tmp_path: Path) -> None:
+    (tmp_path / "saved").write_bytes(tar(entry("manifest.json", b" " * (1 + (16 << 20)))))
+    with pytest.raises(UserError, match=r"^manifest.json .* more than 16777216 bytes"):
+        written(tmp_path / "saved")
+
+
+@pytest.mark.parametrize("options", [[], ["--created", "1767323045"]], ids=["as they are", "with a time"])
+def test_an_archive_that_ends_too_early_is_named_in_one_line(tmp_path: Path, options: list[str]) -> None:
+    file = saved(tmp_path / "saved", Image("gateway", [base(), own()]))
+    os.truncate(file, 8000)
+    assert_named(program(file, *options))
+
+
+@pytest.mark.parametrize("options", [[], ["--created", "1767323045"]], ids=["as they are", "with a time"])
+def test_a_compressed_layer_that_is_damaged_is_named_in_one_line(tmp_path: Path, options: list[str]) -> None:
+    file = saved(tmp_path / "saved", Image("gateway", [own()]), compressed=True)
+    whole = file.read_bytes()
+    start = whole.index(b"\x1f\x8b")
+    file.write_bytes(whole[: start + 40] + bytes(40) + whole[start + 80 :])
+    assert_named(program(file, *options))
