@@ -181,6 +181,35 @@ def test_without_that_time_what_was_built_stays_as_it_is(engine: Path) -> None:
     assert not (engine / "loaded").exists()
 
 
+@pytest.mark.parametrize("time", ["yesterday", "-1", "1.5", "999999999999"])
+def test_a_time_that_is_no_number_of_seconds_is_refused_before_the_build(engine: Path, time: str) -> None:
+    ended = scripts_images(
+        "build", "--ros", "packages", PATH=f"{engine}:{os.environ['PATH']}", SOURCE_DATE_EPOCH=time
+    )
+    assert ended.returncode == 1
+    assert f"SOURCE_DATE_EPOCH is '{time}'" in ended.stderr
+    assert not (engine / "calls").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "time"), [(["save", "/dev/null/file"], ""), (["build", "--ros", "packages"], "1767323045")]
+)
+def test_what_needs_python_names_the_release_that_it_needs(engine: Path, words: list[str], time: str) -> None:
+    (engine / "python3").write_text("#!/bin/sh\nexit 1\n")
+    (engine / "python3").chmod(0o755)
+    ended = scripts_images(*words, PATH=f"{engine}:{os.environ['PATH']}", SOURCE_DATE_EPOCH=time)
+    assert ended.returncode == 1
+    assert "no python3 of 3.11 or newer" in ended.stderr
+    assert not (engine / "calls").exists()
+
+
+def test_a_build_without_that_time_needs_no_python(engine: Path) -> None:
+    """A robot's may be older."""
+    (engine / "python3").write_text("#!/bin/sh\nexit 1\n")
+    (engine / "python3").chmod(0o755)
+    assert "compose --progress quiet build" in build(engine, SOURCE_DATE_EPOCH="")
+
+
 def test_an_archive_that_can_not_be_read_ends_the_build(engine: Path) -> None:
     (engine / "save").write_bytes(b"no archive")
     ended = scripts_images(
