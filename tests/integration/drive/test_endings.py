@@ -36,6 +36,8 @@ if "drive.cli" in sys.orig_argv:
 """What goes wrong in guard and worker: an error wherever the program is, and the end of its part of ROS."""
 IN_ORDER = frozenset({signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT})
 """Signals that end the guard, and so the worker, in order."""
+TYPED = (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT)
+"""Of these, what a terminal sends: to both processes, of which the guard alone takes them."""
 FAIL, SHUT_DOWN = signal.SIGUSR1, signal.SIGUSR2
 
 
@@ -180,16 +182,16 @@ def outlives_the_program(robot: Driving, started_ns: int, why: str) -> None:
     assert 0 < (episode.ended_ns - episode.started_ns) / 1e9 < 60
 
 
-@pytest.mark.parametrize("number", [signal.SIGTSTP, signal.SIGTTOU], ids=lambda each: each.name)
-def test_no_terminal_freezes_it(robot: Driving, number: signal.Signals) -> None:
-    """Ctrl-Z goes to both processes at once: no zero would go out."""
+def test_no_terminal_freezes_it(robot: Driving) -> None:
+    """Ctrl-Z goes to both processes at once, and so does SIGTTOU: no zero would go out."""
 
     def attempt() -> None:
         peer = robot.drive()
         assert robot.guard
         with robot.moving():
-            for pid in (robot.guard.pid, robot.worker.pid):
-                os.kill(pid, number)
+            for number in (signal.SIGTSTP, signal.SIGTTOU):
+                for pid in (robot.guard.pid, robot.worker.pid):
+                    os.kill(pid, number)
             runs_on(robot)
             peer.send(held=False)
             robot.settled()
@@ -198,12 +200,12 @@ def test_no_terminal_freezes_it(robot: Driving, number: signal.Signals) -> None:
     undisturbed(attempt)
 
 
-@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGQUIT], ids=lambda each: each.name)
-def test_the_worker_leaves_to_the_guard_what_a_terminal_sends(robot: Driving, number: signal.Signals) -> None:
+def test_the_worker_leaves_to_the_guard_what_a_terminal_sends(robot: Driving) -> None:
     def attempt() -> None:
         peer = robot.drive()
         with robot.moving():
-            os.kill(robot.worker.pid, number)
+            for number in TYPED:
+                os.kill(robot.worker.pid, number)
             runs_on(robot)
             peer.send(held=False)
             robot.settled()
@@ -212,20 +214,20 @@ def test_the_worker_leaves_to_the_guard_what_a_terminal_sends(robot: Driving, nu
     undisturbed(attempt)
 
 
-@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGINT, signal.SIGQUIT], ids=lambda each: each.name)
-def test_what_it_was_started_to_ignore_does_not_end_it(robot: Driving, number: signal.Signals) -> None:
+def test_what_it_was_started_to_ignore_does_not_end_it(robot: Driving) -> None:
     """SIGHUP by nohup; the others by a script that starts it in the background."""
 
     def attempt() -> None:
         robot.ready()
         ended(robot)
-        with disposed([number], signal.SIG_IGN):
+        with disposed(TYPED, signal.SIG_IGN):
             robot.start()
         assert robot.guard
         with robot.same_worker():
             for pid in (robot.guard.pid, robot.worker.pid):
-                with suppress(ProcessLookupError):  # After a stall the guard has ended the worker.
-                    os.kill(pid, number)
+                for number in TYPED:
+                    with suppress(ProcessLookupError):  # After a stall the guard has ended the worker.
+                        os.kill(pid, number)
             runs_on(robot)
         ended(robot)
 
