@@ -78,7 +78,8 @@ def test_the_doctor_finds_mux_base_and_timeout_and_measures_what_a_pulse_does(ro
 def test_the_doctor_moves_nothing_while_a_driver_has_the_robot(robot: Driving) -> None:
     robot.drive(vx=0.1)
     since_ns = time.monotonic_ns()
-    done = robot_drive("doctor", "--config", str(robot.directory / "drive.yaml"), "--pulse", "--json")
+    config = str(robot.directory / "drive.yaml")
+    done = run("tests.support.unseeing_doctor", "doctor", "--config", config, "--pulse", "--json")
     assert "left out" in findings(done)["pulse"]["what"]
     seen = {round(speed, 6) for seen_ns, speed in robot.witness.seen if seen_ns >= since_ns}
     assert seen

