@@ -12,6 +12,7 @@ from tempfile import TemporaryDirectory
 import psutil
 import pytest
 
+from bench.video.foreign import end
 from common.ros_node import OwnNode, message_class, ros_node
 from drive.config import DriveSettings
 from omniseer.drive.v1 import drive_pb2 as pb
@@ -24,6 +25,7 @@ from tests.support.waiting import wait_until
 # Timed: a machine that does other things makes the robot stop without need, which is right and fails a test.
 pytestmark = [pytest.mark.ros, pytest.mark.timed]
 
+END_S = 10
 AT_THE_BASE_MS = 280
 """docs/driving.md: nothing is published by a command older than 250 ms, which
 tests/unit/drive/processes/test_worker.py judges to the millisecond. The rest is the last velocity's way
@@ -257,25 +259,22 @@ def test_a_reset_waits_until_a_source_that_moved_the_robot_can_be_heard(robot: D
     undisturbed(attempt)
 
 
-def test_a_terminal_that_reads_nothing_keeps_no_zero_back(tmp_path: Path, ros_domain: int) -> None:  # noqa: ARG001
+def test_a_terminal_that_reads_nothing_keeps_no_zero_back(robot: Driving) -> None:
     """Standard error is a full pipe: a process that logs there itself would block before the zeros."""
+    assert robot.guard
+    robot.guard.terminate()
+    robot.guard.wait(END_S)
+    wait_until(lambda: robot.observer.state() is None, "the drive program has gone")
     reader, writer = os.pipe()
-    with driving(tmp_path) as robot:
-        assert robot.guard
-        robot.guard.terminate()
-        robot.guard.wait()
-        robot.observer.close()
-        os.set_blocking(writer, False)
+    try:
         try:
-            while True:
-                os.write(writer, b"x" * 4096)
-        except BlockingIOError:
-            os.set_blocking(writer, True)
-        config = tmp_path / "drive.yaml"
-        robot.guard = subprocess.Popen(
-            [sys.executable, "-m", "drive.cli", "serve", "--config", str(config)], stderr=writer
-        )
-        os.close(writer)
+            fill(writer)
+            config = robot.directory / "drive.yaml"
+            robot.guard = subprocess.Popen(
+                [sys.executable, "-m", "drive.cli", "serve", "--config", str(config)], stderr=writer
+            )
+        finally:
+            os.close(writer)
         wait_until(robot.observer.state, "the drive program serves", 30)
 
         def freeze() -> float:
@@ -288,5 +287,16 @@ def test_a_terminal_that_reads_nothing_keeps_no_zero_back(tmp_path: Path, ros_do
             return robot.witness.zero_after_ms(began_ns)
 
         keeps(1000, "worker frozen, ms", freeze, per_stalled_s=MS)
-        robot.close()
-    os.close(reader)
+    finally:
+        end(robot.guard)  # The next test has one that logs to the robot's file.
+        os.close(reader)
+
+
+def fill(pipe: int) -> None:
+    """Writes until there is no room any more; the pipe blocks afterwards."""
+    os.set_blocking(pipe, False)
+    try:
+        while True:
+            os.write(pipe, b"x" * 4096)
+    except BlockingIOError:
+        os.set_blocking(pipe, True)
