@@ -12,7 +12,6 @@ from tests.support.helper import first_line, helper
 pytestmark = pytest.mark.ros
 
 
-@pytest.mark.timed  # The doctor looks for three seconds.
 @pytest.mark.usefixtures("ros_domain")
 def test_a_peer_whose_name_is_no_text_is_a_finding(tmp_path: Path) -> None:
     config = tmp_path / "drive.yaml"
