@@ -34,8 +34,10 @@ pytestmark = pytest.mark.timeout(240)
 
 @pytest.fixture(autouse=True)
 def _asks_again_early(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each receiver that is killed while it reads costs as long: two of its reports, not five."""
-    monkeypatch.setattr("bridge.uploads.receivers._SILENT_S", 4.0)
+    """Shortens what each kill costs at most, while a receiver reads, at another request, and after both."""
+    monkeypatch.setattr("bridge.uploads.receivers._SILENT_S", 4.0)  # Two reports, not five.
+    monkeypatch.setattr("bridge.uploads.receivers._ANSWER_S", 10.0)
+    monkeypatch.setattr("bridge.uploads.uploads.LONGEST_PAUSE_S", 2.0)
 
 
 @asynccontextmanager
