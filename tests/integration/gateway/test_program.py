@@ -43,7 +43,6 @@ def test_check_says_what_it_found_good(config: Path) -> None:
     assert "configuration good" in only_line(done.stdout)
 
 
-@pytest.mark.parametrize("command", ["check", "serve"])
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -54,14 +53,19 @@ def test_check_says_what_it_found_good(config: Path) -> None:
         (f"sources: []\nmetrics: {{port: 0, host: {'a' * 64}, insecure: true}}", "a host name or an address"),
     ],
 )
-def test_a_wrong_configuration_ends_with_one_line_and_2(
-    tmp_path: Path, command: str, text: str, words: str
-) -> None:
+def test_a_wrong_configuration_ends_with_one_line_and_2(tmp_path: Path, text: str, words: str) -> None:
     path = tmp_path / "wrong.yaml"
     path.write_text(text)
-    done = gateway(command, "--config", str(path))
+    done = gateway("check", "--config", str(path))
     assert done.returncode == 2
     assert words in only_line(done.stderr)
+
+
+def test_serve_ends_with_the_same_line_and_2(tmp_path: Path) -> None:
+    path = tmp_path / "wrong.yaml"
+    path.write_text("grpc: {host: 0.0.0.0}")
+    checked, served = (gateway(command, "--config", str(path)) for command in ("check", "serve"))
+    assert (served.returncode, only_line(served.stderr)) == (2, only_line(checked.stderr))
 
 
 def test_a_missing_configuration_is_named(tmp_path: Path) -> None:
