@@ -13,6 +13,7 @@ from bridge.uploads.attempt import Attempt, Parties
 from bridge.uploads.parts import PartSender
 from bridge.uploads.problems import AttemptError
 from bridge.uploads.receivers import Receivers
+from fleet.receipt_keys import ReceiptSigner
 from hub.receiver.service import ReceiverService
 from hub.receiver.store import Store, StoreError, StoreProblem
 from hub.receiver.verified import THREADS, Party
@@ -105,46 +106,60 @@ def threads() -> Iterator[ThreadPoolExecutor]:
 async def test_each_failure_costs_attempts_and_nothing_else(
     store_server: S3Server, threads: ThreadPoolExecutor, problem: StoreProblem, *, late: bool
 ) -> None:
-    signer = new_signer()
-    for at in range(1, MOST_CALLS):
-        settings = store_server.settings()
-        store, robot = Store(settings), Robot()
-        robot.add("one", FILES)
-        failing: Any = Failing(store, at, problem, late)
-        records: Any = Records()
-        party = Party(FLEET, signer, (signer.public_key,))
-        hub = Hub(ReceiverService(party, failing, records, threads))
-        host = store_server.url.removeprefix("http://")
-        sends = UploadSettings(store_hosts=(host,), insecure_store=True)
-        failures = 0
-        async with PartSender(sends) as sender:
-            parties = Parties(
-                fleet=FLEET,
-                robot=ROBOT,
-                source=robot,
-                receivers=Receivers(hub, ROBOT),
-                sender=sender,
-                keys=(signer.public_key,),
-            )
-            for _ in range(ATTEMPTS):
-                attempt = Attempt(
-                    parties, "one", begun=lambda *_: None, progress=lambda _: None, sent=lambda: None
-                )
-                try:
-                    await attempt.run()
-                except AttemptError:
-                    failures += 1
-                else:
-                    break
-            else:
-                pytest.fail(f"not verified after {failing.calls[at - 1]}, call {at}, has failed once")
-            sent = sender.sent_bytes
-        stored = {name: store.read(f"{FLEET}/{ROBOT}/one/{name}", 1_000_000) for name in FILES}
+    signer, store = new_signer(), Store(store_server.settings())
+    try:
+        for at in range(1, MOST_CALLS):
+            failing: Any = Failing(store, at, problem, late)
+            # Each in a recording of its own, of which the store has nothing yet.
+            failures = await uploaded(failing, f"one-{at:03}", signer, threads, store_server)
+            if len(failing.calls) < at:
+                assert at > 20, "every call has failed once"
+                assert failures == 0
+                return
+    finally:
         store.close()
-        assert stored == FILES, f"call {at}"
-        assert sent == sum(map(len, FILES.values())), f"call {at}: no part is sent twice"
-        if len(failing.calls) < at:
-            assert at > 20, "every call has failed once"
-            assert failures == 0
-            return
     pytest.fail("there is no end of calls")
+
+
+async def uploaded(
+    failing: Any, recording_id: str, signer: ReceiptSigner, threads: ThreadPoolExecutor, server: S3Server
+) -> int:
+    """Asserts that a recording is verified in spite of a call that fails.
+
+    Returns:
+        How many attempts have failed.
+    """
+    records: Any = Records()
+    robot, at = Robot(), failing.at
+    robot.add(recording_id, FILES)
+    party = Party(FLEET, signer, (signer.public_key,))
+    hub = Hub(ReceiverService(party, failing, records, threads))
+    sends = UploadSettings(store_hosts=(server.url.removeprefix("http://"),), insecure_store=True)
+    failures = 0
+    async with PartSender(sends) as sender:
+        parties = Parties(
+            fleet=FLEET,
+            robot=ROBOT,
+            source=robot,
+            receivers=Receivers(hub, ROBOT),
+            sender=sender,
+            keys=(signer.public_key,),
+        )
+        for _ in range(ATTEMPTS):
+            attempt = Attempt(
+                parties, recording_id, begun=lambda *_: None, progress=lambda _: None, sent=lambda: None
+            )
+            try:
+                await attempt.run()
+            except AttemptError:
+                failures += 1
+            else:
+                break
+        else:
+            pytest.fail(f"not verified after {failing.calls[at - 1]}, call {at}, has failed once")
+        sent = sender.sent_bytes
+    keys = {name: f"{FLEET}/{ROBOT}/{recording_id}/{name}" for name in FILES}
+    stored = {name: failing.store.read(key, 1_000_000) for name, key in keys.items()}
+    assert stored == FILES, f"call {at}"
+    assert sent == sum(map(len, FILES.values())), f"call {at}: no part is sent twice"
+    return failures
