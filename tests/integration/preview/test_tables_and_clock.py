@@ -25,7 +25,7 @@ def in_order(stream: Stream) -> None:
     assert len(stream.access_units) > SECONDS
 
 
-@pytest.mark.parametrize("fps", [10, 12, 19, 24, 25])
+@pytest.mark.parametrize("fps", [10, 12, 19, 25])
 def test_at_rates_of_ones_own(tmp_path: Path, fps: int) -> None:
     with RunningPreview(tmp_path, {"profiles": {"balanced": {"fps": fps}}}) as preview:
         preview.enable()
