@@ -82,7 +82,7 @@ def test_a_topic_is_a_camera_beside_the_others_and_so_are_its_faults(tmp_path: P
                 )
                 assert [camera.name for camera in status.preview.cameras] == ["front", "rear", "arm"]
                 assert not is_faulted(status)
-                assert eye.reconnects == 0, "one SRT connection for all cameras"
+                assert eye.lost == [], "one SRT connection for all cameras"
 
                 os.kill(robot.program_pid("tap"), signal.SIGKILL)
                 eye.sees("red")
@@ -90,7 +90,7 @@ def test_a_topic_is_a_camera_beside_the_others_and_so_are_its_faults(tmp_path: P
                     lambda: robot.restarts("tap") >= 1, "the engine starts the tap again", BACK_WITHIN_S
                 )
                 eye.sees("green", BACK_WITHIN_S)
-                assert eye.reconnects == 0
+                assert eye.lost == []
         # Its publisher has ended.
         with Eye(robot.preview_port) as eye:
             eye.sees("red")

@@ -64,4 +64,4 @@ def test_all_three_are_shown_with_the_commands_of_the_page(tap: RunningTap, tmp_
                 eye.sees(COLOURS[name])
                 # A viewer may see it before the gateway has heard of it.
                 wait_until(partial(lists_as_live, ground, name), f"{name} is live")
-            assert eye.reconnects == 0, "one SRT connection for all"
+            assert eye.lost == [], "one SRT connection for all"
