@@ -13,6 +13,7 @@ foreground leaves of the processors.
 """
 
 import os
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
@@ -210,7 +211,10 @@ class _ByFile(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
             node.shutdown()
             return
         self.workqueue.move_to_end(unit, last=False)
-        super()._assign_work_unit(node)
+        # A worker that has crashed meanwhile can be sent nothing. Its end is reported next, and remove_node
+        # gives to others what it had, this unit as well.
+        with suppress(OSError):
+            super()._assign_work_unit(node)
 
     def _next_unit(self, node: Any) -> str | None:
         """Returns the unit that the worker is to run next.

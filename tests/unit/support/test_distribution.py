@@ -2,10 +2,12 @@
 
 import os
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
-from tests.support.distribution import LONGEST, unit_of
+from tests.support.distribution import LONGEST, pytest_xdist_make_scheduler, unit_of
 
 pytest_plugins = ["pytester"]
 
@@ -63,6 +65,48 @@ def test_a_worker_that_replaces_one_of_the_foreground_is_in_the_foreground(pytes
     files |= {f"test_plain_{each}": PLAIN.format(each) for each in range(3)}
     ran = run(pytester, files, workers=3)
     ran.assert_outcomes(passed=6, failed=3)
+
+
+def test_what_a_crashed_worker_was_to_run_is_run_by_another(tmp_path: Path) -> None:
+    """The worker's end is noticed only after more was to be sent to it."""
+    first, second = Worker(), Worker()
+    config: Any = SimpleNamespace(
+        option=SimpleNamespace(loadscopereorder=False), rootpath=tmp_path, getvalue=lambda _: ["popen"] * 2
+    )
+    scheduler: Any = pytest_xdist_make_scheduler(config, None)
+    tests = [f"test_{each}.py::test" for each in range(6)]
+    for each in range(6):
+        (tmp_path / f"test_{each}.py").touch()
+    for worker in (first, second):
+        scheduler.add_node(worker)
+        scheduler.add_node_collection(worker, list(tests))
+    first.crashed = True
+    scheduler.schedule()
+    assert scheduler.remove_node(first) == tests[0]
+    while second.sent:
+        scheduler.mark_test_complete(second, second.sent.pop(0))
+    assert sorted(second.ran) == [1, 2, 3, 4, 5]
+
+
+class Worker:
+    """One of pytest-xdist's workers, as its scheduler sees it."""
+
+    def __init__(self) -> None:
+        self.workerinput = {"robot_gateway_background": False}
+        self.shutting_down = False
+        self.crashed = False
+        self.sent: list[int] = []
+        self.ran: list[int] = []
+        self.gateway = SimpleNamespace(id="gw")
+
+    def send_runtest_some(self, indices: list[int]) -> None:
+        if self.crashed:
+            raise OSError("cannot send (already closed?)")
+        self.sent += indices
+        self.ran += indices
+
+    def shutdown(self) -> None:
+        self.shutting_down = True
 
 
 def run(pytester: pytest.Pytester, files: dict[str, str], workers: int) -> pytest.RunResult:
