@@ -246,7 +246,12 @@ async def test_a_connection_is_looked_at_as_it_comes(monkeypatch: pytest.MonkeyP
     """Not at the next of the looks that come anyway, of which there is none here."""
     monkeypatch.setattr("gateway.rpc.connections.guard.SCAN_EVERY_S", 3600.0)
     guard = ConnectionGuard(Admission(LimitSettings()))
-    async with await asyncio.start_server(lambda *_: None, "127.0.0.1", 0) as server:
+
+    async def until_closed(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.read()
+        writer.close()
+
+    async with await asyncio.start_server(until_closed, "127.0.0.1", 0) as server:
         port = server.sockets[0].getsockname()[1]
         guarding = asyncio.create_task(guard.run(port))
         try:
