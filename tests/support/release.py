@@ -43,8 +43,8 @@ def clone(repository: Path, target: Path) -> Path:
 
 
 def _use_tools(repository: Path) -> None:
-    """Gives a repository the tools of this tree: to install them takes half a minute."""
-    subprocess.run([ROOT / "scripts/release", "--help"], stdout=subprocess.DEVNULL, check=True, timeout=120)
+    """Gives a repository the tools of this tree: to install them takes half a minute, or minutes."""
+    subprocess.run([ROOT / "scripts/release", "--help"], stdout=subprocess.DEVNULL, check=True, timeout=400)
     (repository / ".cache").mkdir()
     (repository / ".cache/release").symlink_to(ROOT / ".cache/release")
 
