@@ -25,8 +25,9 @@ LATEST = 2**63 - 1
 ARMED_AFTER = 50
 """Commands, of which a driver sends 50 a second."""
 HOSTILE = f"{CONTROL_CHARACTERS}\x1b]52;c;cm0gLXJm\x07"
-OURS = re.compile(r"\x1b\[(?:2K|\?1004[hl]|\?u|c)|\r\n|\r(?=\x1b\[2K)|\r$")
-"""What robotctl itself has a terminal do: draw a line anew, report its focus, say which keys it reports."""
+OURS = re.compile(r"\x1b\[(?:2K|\?1004[hl]|\?u|5n|c)|\r\n|\r(?=\x1b\[2K)|\r$")
+"""What robotctl itself has a terminal do: draw a line anew, report its focus, and say which keys it reports,
+how it is and what it is."""
 
 
 class HostileRobot(GatewayDouble):
