@@ -9,7 +9,7 @@ import struct
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from itertools import pairwise
 from typing import Any
 
@@ -105,14 +105,13 @@ def play(sender: SrtSender, pieces: list[bytes]) -> None:
         sender.send(piece)
 
 
-def everything(viewer: Receiver, silence_s: float = 1.0) -> list[Frame]:
-    """Returns the frames that have come, and those that come until none does."""
-    frames = []
-    while True:
-        try:
-            frames.append(viewer.next_frame(silence_s))
-        except NoFrameError:
-            return frames
+def everything(viewer: Receiver, most: int = 2 * FRAMES) -> list[Frame]:
+    """Returns the frames that have come, and those that come until none does for a second, `most` at most."""
+    frames: list[Frame] = []
+    with suppress(NoFrameError):
+        while len(frames) < most:
+            frames.append(viewer.next_frame(1.0))
+    return frames
 
 
 def watched(
@@ -336,16 +335,21 @@ def test_a_decoder_that_hangs_over_all_connections_is_what_is_reported(
     assert "frames that bring no picture" in end.what
 
 
-def test_ten_viewers(port: int, pieces: list[bytes]) -> None:
-    with SrtSender(port) as sender, ExitStack() as stack:
-        viewers = []
-        for _ in range(10):
-            sender.viewer_joined.clear()
-            viewers.append(stack.enter_context(receiver(port, max_age_s=1000)))
-            assert sender.viewer_joined.wait(PATIENCE_S)
-        play(sender, pieces[:20])
-        for viewer in viewers:
-            assert len([viewer.next_frame(PATIENCE_S) for _ in range(20)]) == 20
+def test_ten_viewers(port: int, pieces: list[bytes], monkeypatch: pytest.MonkeyPatch) -> None:
+    # Ten decoders that begin at once may be slower than the stream here; what is done then has a test above.
+    monkeypatch.setattr("console.receiver.decoder_queue._LONGEST_WAIT_S", PATIENCE_S)
+
+    def attempt() -> None:
+        with no_stall(), SrtSender(port) as sender, ExitStack() as stack:
+            viewers = []
+            for _ in range(10):
+                sender.viewer_joined.clear()
+                viewers.append(stack.enter_context(receiver(port, max_age_s=1000)))
+                assert sender.viewer_joined.wait(PATIENCE_S)
+            play(sender, [*pieces[:20], *[NO_FRAME] * AFTERWARDS])
+            assert [len(everything(viewer, most=20)) for viewer in viewers] == [20] * 10
+
+    undisturbed(attempt)
 
 
 def test_a_sender_that_restarts_is_an_end_and_can_be_connected_to_again(
