@@ -76,7 +76,7 @@ def test_two_builds_of_a_commit_are_the_same_images(
 
 
 def test_what_python_has_compiled_is_taken(repository: Path) -> None:
-    """All files have one time now, by which Python tells whether a compiled module is that of its source."""
+    """Python compares the time of a module with that of what was compiled of it; all files have one now."""
     made(repository, ("robot-bridge",))
     run = ("run", "--rm", "--network=none", "--read-only", "--entrypoint=python", f"robot-bridge:{TAG}", "-v")
     ended = subprocess.run(

@@ -15,22 +15,11 @@ from console.client.drive_session import COMMANDS_PER_S, DriveOptions, DriveSess
 from console.client.errors import Cancelled, Overloaded, Refused, Unreachable
 from console.client.loop_thread import LoopThread
 from console.client.mapping.methods import Method
-from console.client.results import DriveLimits, DriveOpened, DrivePhase, DriveState
+from console.client.results import DriveOpened, DrivePhase, DriveState
 from omniseer.gateway.v1 import teleop_pb2
 from tests.support.eventually import eventually
+from tests.unit.console.client.results.test_driving import LIMITS
 
-LIMITS = DriveLimits(
-    max_vx_mps=0.35,
-    max_vy_mps=0.25,
-    max_wz_rad_s=0.8,
-    acceleration_mps2=0.5,
-    acceleration_rad_s2=1.0,
-    max_picture_age_ms=600,
-    picture_travel_m=0.1,
-    line_of_sight=True,
-    line_of_sight_mps=0.15,
-    line_of_sight_rad_s=0.4,
-)
 SPEED_MPS = 0.125
 PATIENT_S = 60.0
 
